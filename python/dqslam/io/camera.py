@@ -1,0 +1,110 @@
+"""Cameras from JSON or TOML.
+
+Keys: ``fx fy cx cy`` px, ``width height`` px, and the lens distortion of OpenCV's five numbers
+(absent: none) as ``k1 k2 p1 p2 k3``, or as a list in that order under ``distortion`` or
+``dist_k1k2p1p2k3``, or as a table ``distortion``. Other keys are ignored.
+Integer pixel coordinates are pixel centres: the image spans [-0.5, width - 0.5] in x.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from dqslam import _core
+from dqslam.io.files import FileError, read_text
+
+INTRINSICS = ("fx", "fy", "cx", "cy", "width", "height")
+DISTORTION = ("k1", "k2", "p1", "p2", "k3")
+DISTORTION_LISTS = ("distortion", "dist_k1k2p1p2k3")
+# Reading these as pinhole with radial and tangential distortion would be wrong without a sign.
+OTHER_MODELS = ("fisheye", "equidistant", "kannala", "omni", "double_sphere", "rational", "fov")
+
+
+def read_camera(path: str | Path) -> _core.Camera:
+    """Read a pinhole camera with its lens distortion; TOML if the name ends so, else JSON."""
+    text = read_text(path)
+    table = _parse(path, text)
+    missing = [key for key in INTRINSICS if key not in table]
+    if missing:
+        raise FileError(path, f"missing {', '.join(missing)} (it has: {', '.join(table)})")
+    model = table.get("model")
+    if isinstance(model, str) and any(name in model.lower() for name in OTHER_MODELS):
+        message = f"model is {model}; only pinhole with k1 k2 p1 p2 k3 is known"
+        raise FileError(path, message, _line_of(text, "model"))
+    values = {key: _number(path, text, key, table[key]) for key in INTRINSICS}
+    for key in ("fx", "fy", "width", "height"):
+        if values[key] <= 0:
+            raise FileError(path, f"{key} is {values[key]:g}, not positive", _line_of(text, key))
+    for key in ("width", "height"):
+        if values[key] != math.floor(values[key]):
+            message = f"{key} is {values[key]:g}, not a whole number of pixels"
+            raise FileError(path, message, _line_of(text, key))
+    return _core.Camera(
+        values["fx"],
+        values["fy"],
+        values["cx"],
+        values["cy"],
+        int(values["width"]),
+        int(values["height"]),
+        distortion=_distortion(path, text, table),
+    )
+
+
+def _parse(path: str | Path, text: str) -> dict[str, Any]:
+    try:
+        if Path(path).suffix.lower() == ".toml":
+            table: Any = tomllib.loads(text)
+        else:
+            table = json.loads(text)
+    except json.JSONDecodeError as error:
+        raise FileError(path, f"not JSON: {error.msg}", error.lineno) from None
+    except tomllib.TOMLDecodeError as error:
+        at = re.search(r"\(at line (\d+)", str(error))
+        message = f"not TOML: {str(error).split(' (at ')[0]}"
+        raise FileError(path, message, int(at[1]) if at else None) from None
+    except RecursionError:
+        raise FileError(path, "nested too deeply") from None
+    if not isinstance(table, dict):
+        raise FileError(path, "holds no table of named values")
+    return table
+
+
+def _distortion(path: str | Path, text: str, table: dict[str, Any]) -> list[float]:
+    given = [key for key in DISTORTION_LISTS if key in table]
+    named = [key for key in DISTORTION if key in table]
+    if len(given) + bool(named) > 1:
+        message = f"distortion is given twice: {', '.join([*given, *named])}"
+        raise FileError(path, message, _line_of(text, (given + named)[1]))
+    source: Any = table[given[0]] if given else table
+    if isinstance(source, dict):
+        unknown = [key for key in source if given and key not in DISTORTION]
+        if unknown:
+            message = f"{given[0]} knows no {unknown[0]}, only {' '.join(DISTORTION)}"
+            raise FileError(path, message, _line_of(text, unknown[0]))
+        return [_number(path, text, key, source.get(key, 0.0)) for key in DISTORTION]
+    # Four numbers are OpenCV's shorter form, without k3.
+    if not isinstance(source, list) or len(source) not in (4, 5):
+        message = f"{given[0]} is not a list of 4 or 5 numbers: {' '.join(DISTORTION)}"
+        raise FileError(path, message, _line_of(text, given[0]))
+    return [_number(path, text, given[0], value) for value in (*source, 0.0)[:5]]
+
+
+def _number(path: str | Path, text: str, key: str, value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise FileError(path, f"{key} is {value!r}, not a number", _line_of(text, key))
+    if not math.isfinite(value):
+        raise FileError(path, f"{key} is {value}, not finite", _line_of(text, key))
+    return float(value)
+
+
+def _line_of(text: str, key: str) -> int | None:
+    """Find the first line that sets a key; None when it cannot be told."""
+    for number, line in enumerate(text.split("\n"), start=1):
+        if re.search(rf"(?<![\w-])[\"']?{re.escape(key)}[\"']?\s*(?:[:=\]])", line):
+            return number
+    return None

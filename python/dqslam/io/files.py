@@ -1,0 +1,120 @@
+"""Text files: read with errors that name the file and the line, write whole or not at all."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+import os
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class FileError(ValueError):
+    """What is wrong in a file, as ``path:line: message`` (or ``path: message``)."""
+
+    def __init__(self, path: str | Path, message: str, line: int | None = None) -> None:
+        super().__init__(f"{path}: {message}" if line is None else f"{path}:{line}: {message}")
+
+
+def read_text(path: str | Path) -> str:
+    """Read a UTF-8 file; a missing, unreadable or empty one is a FileError."""
+    try:
+        text = Path(path).read_text(encoding="utf-8-sig")
+    except FileNotFoundError:
+        raise FileError(path, "no such file") from None
+    except OSError as error:
+        raise FileError(path, f"cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise FileError(path, "is not a text file (UTF-8)") from None
+    if not text.strip():
+        raise FileError(path, "is empty")
+    return text
+
+
+def read_rows(path: str | Path) -> tuple[list[str], list[int]]:
+    """Read the lines that are neither blank nor comments (#), and their numbers from 1."""
+    numbered = [
+        (line, number)
+        for number, line in enumerate(read_text(path).split("\n"), start=1)
+        if line.strip() and not line.lstrip().startswith("#")
+    ]
+    if not numbered:
+        raise FileError(path, "holds nothing but comments")
+    return [line for line, _ in numbered], [number for _, number in numbered]
+
+
+def parse_numbers(
+    path: str | Path, name: str, cells: Sequence[str], lines: Sequence[int]
+) -> NDArray[np.float64]:
+    """Turn the cells of one column into finite numbers, shape (n,)."""
+    try:
+        values = np.array(list(map(float, cells)))
+    except ValueError:
+        _blame_cell(path, name, cells, lines)
+        raise
+    bad = np.flatnonzero(~np.isfinite(values))
+    if bad.size:
+        raise FileError(path, f"{name} is {cells[bad[0]].strip()}, not finite", lines[bad[0]])
+    return values
+
+
+def parse_integers(
+    path: str | Path, name: str, cells: Sequence[str], lines: Sequence[int]
+) -> NDArray[np.int64]:
+    """Turn the cells of one column into whole numbers, shape (n,); "5.0" is one."""
+    values = parse_numbers(path, name, cells, lines)
+    # Beyond 2^53 a float cannot tell neighbouring integers apart.
+    bad = np.flatnonzero((values != np.floor(values)) | (np.abs(values) >= 2.0**53))
+    if bad.size:
+        raise FileError(
+            path, f"{name} is {cells[bad[0]].strip()}, not a whole number", lines[bad[0]]
+        )
+    return values.astype(np.int64)
+
+
+def _blame_cell(path: str | Path, name: str, cells: Sequence[str], lines: Sequence[int]) -> None:
+    for cell, line in zip(cells, lines, strict=True):
+        try:
+            float(cell)
+        except ValueError:
+            what = f"{cell.strip()!r}, not a number" if cell.strip() else "empty"
+            raise FileError(path, f"{name} is {what}", line) from None
+
+
+def write_text(path: str | Path, parts: str | Iterable[str]) -> None:
+    """Write a file under a temporary name, then rename: readers never see half a file."""
+    path = Path(path)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with temporary.open("w", encoding="utf-8", newline="\n") as file:
+            file.writelines([parts] if isinstance(parts, str) else parts)
+        temporary.replace(path)
+    except OSError as error:
+        raise FileError(path, f"cannot be written: {error.strerror}") from None
+    finally:
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
+
+
+def write_json(path: str | Path, content: dict[str, Any]) -> None:
+    """Write JSON that every reader accepts: NaN and infinity become null."""
+    text = json.dumps(_jsonable(content), indent=2, allow_nan=False, ensure_ascii=False)
+    write_text(path, text + "\n")
+
+
+def _jsonable(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {str(key): _jsonable(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_jsonable(item) for item in value]
+    if isinstance(value, np.ndarray | np.generic):
+        return _jsonable(value.tolist())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

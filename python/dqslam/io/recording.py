@@ -1,0 +1,188 @@
+"""A recording from files: boxes meet the poses of their time, and the objects of their id."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dqslam import _core
+from dqslam.io.camera import read_camera
+from dqslam.io.detections import DetectionTable, read_detections
+from dqslam.io.files import FileError
+from dqslam.io.trajectory import read_trajectory
+from dqslam.recording import Detections, Odometry, Recording
+
+# Two boxes do not tell an object's distance from its size when the path is noisy.
+FEWEST_BOXES = 3
+
+Ids = Literal["track_id", "class_id"]
+
+
+@dataclass(frozen=True)
+class OdometryNoise:
+    """Standard deviations of one step of odometry, each axis: metres and radians."""
+
+    translation_m: float = 0.01
+    rotation_rad: float = 0.005
+
+    def __post_init__(self) -> None:
+        """Refuse what is no standard deviation."""
+        for name, sigma in (("translation", self.translation_m), ("rotation", self.rotation_rad)):
+            if not (np.isfinite(sigma) and sigma > 0):
+                raise ValueError(f"odometry noise: {name} is {sigma:g}, not positive")
+
+    def covariance(self, steps: int) -> NDArray[np.float64]:
+        """Repeat the covariance of a step, translation first: shape (steps, 6, 6)."""
+        variance = np.repeat([self.translation_m**2, self.rotation_rad**2], 3)
+        return np.tile(np.diag(variance), (steps, 1, 1))
+
+
+@dataclass(frozen=True)
+class Dropped:
+    """Boxes of the files that are not in the recording, and why."""
+
+    below_min_score: int  #: boxes
+    without_id: int  #: boxes whose id is -1 or empty
+    without_pose: int  #: boxes with no pose near enough in time
+    repeated: int  #: boxes beside a better one of the same object on the same pose
+    few_boxes: dict[int, int]  #: object id: boxes, of objects seen fewer than 3 times
+
+    @property
+    def total(self) -> int:
+        """Count the dropped boxes."""
+        counted = self.below_min_score + self.without_id + self.without_pose + self.repeated
+        return counted + sum(self.few_boxes.values())
+
+
+def load_recording(
+    camera: str | Path,
+    odometry: str | Path,
+    detections: str | Path,
+    *,
+    min_score: float = 0.5,
+    ids: Ids = "track_id",
+    max_time_difference: float | None = None,
+    odometry_noise: OdometryNoise | None = None,
+) -> tuple[Recording, Dropped]:
+    """Read a recording in SE(3), the robot being the camera, and what had to be left out of it.
+
+    Parameters
+    ----------
+    camera, odometry, detections
+        Files: JSON or TOML; a TUM trajectory, world_from_camera; CSV.
+    min_score
+        Boxes with a lower score are left out.
+    ids
+        The column that tells which boxes show the same object.
+    max_time_difference
+        A box belongs to the nearest pose in time, if that is within this many seconds; by default
+        half the median interval between poses.
+    odometry_noise
+        The uncertainty of one step, which trajectory files do not carry.
+    """
+    if not 0 <= min_score <= 1:
+        raise ValueError(f"min_score is {min_score:g}, not between 0 and 1")
+    lens = read_camera(camera)
+    times, path = read_trajectory(odometry)
+    if len(times) < 2:
+        raise FileError(odometry, "one pose only: nothing moves")
+    table = read_detections(detections, width=lens.width, height=lens.height)
+    object_id = _object_ids(table, ids)
+    pose, late = nearest_pose(times, table.timestamp)
+    tolerance = 0.5 * float(np.median(np.diff(times)))
+    if max_time_difference is not None:
+        tolerance = max_time_difference
+    rows, dropped = _select(table.score, object_id, pose, late, min_score, tolerance)
+    if not rows.size:
+        raise FileError(detections, _nothing_left(table, dropped, ids, tolerance, times))
+    model = _core.PoseModel.SE3
+    noise = odometry_noise or OdometryNoise()
+    names = dict(zip(table.class_id.tolist(), table.class_name, strict=True))
+    recording = Recording(
+        camera=lens,
+        timestamps=times,
+        odometry=Odometry(
+            pose_model=model,
+            first_pose=path[0],
+            relative=_core.between(model, path[:-1], path[1:]),
+            covariance=noise.covariance(len(path) - 1),
+        ),
+        detections=Detections(
+            pose=pose[rows],
+            box=lens.undistort_boxes(table.box[rows]),
+            score=table.score[rows],
+            class_id=table.class_id[rows],
+            object_id=object_id[rows],
+            class_names={number: name or str(number) for number, name in names.items()},
+        ),
+        positions=None,
+    )
+    return recording, dropped
+
+
+def nearest_pose(
+    pose_times: NDArray[np.float64], times: NDArray[np.float64]
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Find the pose nearest in time to each of ``times`` (m,): its row, and how far off in s."""
+    after = np.clip(np.searchsorted(pose_times, times), 1, len(pose_times) - 1)
+    nearer_before = times - pose_times[after - 1] <= pose_times[after] - times
+    pose = (after - nearer_before).astype(np.int64)
+    return pose, np.abs(pose_times[pose] - times)
+
+
+def _object_ids(table: DetectionTable, ids: Ids) -> NDArray[np.int64]:
+    if ids == "class_id":
+        return table.class_id
+    if ids != "track_id":
+        raise ValueError(f"ids is {ids!r}, not 'track_id' or 'class_id'")
+    if table.track_id is None:
+        message = f"no column track_id (it has: {', '.join(table.columns)})"
+        raise FileError(table.path, message, 1)
+    return table.track_id
+
+
+def _select(
+    score: NDArray[np.float64],
+    object_id: NDArray[np.int64],
+    pose: NDArray[np.int64],
+    late: NDArray[np.float64],
+    min_score: float,
+    tolerance: float,
+) -> tuple[NDArray[np.int64], Dropped]:
+    """Choose rows: one box an object and pose, at least 3 an object; in order of pose, object."""
+    scored = score >= min_score
+    named = scored & (object_id >= 0)
+    timely = named & (late <= tolerance)
+    rows = np.flatnonzero(timely)
+    # The nearest in time first, and of one image the best score.
+    order = rows[np.lexsort((-score[rows], late[rows], object_id[rows], pose[rows]))]
+    again = (pose[order][1:] == pose[order][:-1]) & (object_id[order][1:] == object_id[order][:-1])
+    best = order[np.concatenate([[True], ~again])[: len(order)]]
+    objects, counts = np.unique(object_id[best], return_counts=True)
+    few = counts < FEWEST_BOXES
+    dropped = Dropped(
+        below_min_score=int(np.sum(~scored)),
+        without_id=int(np.sum(scored & ~named)),
+        without_pose=int(np.sum(named & ~timely)),
+        repeated=len(rows) - len(best),
+        few_boxes=dict(zip(objects[few].tolist(), counts[few].tolist(), strict=True)),
+    )
+    return best[~np.isin(object_id[best], objects[few])], dropped
+
+
+def _nothing_left(
+    table: DetectionTable, dropped: Dropped, ids: Ids, tolerance: float, times: NDArray[np.float64]
+) -> str:
+    """Say why none of the boxes can be used."""
+    return (
+        f"no object is left of {len(table.line)} boxes: {dropped.below_min_score} below the least "
+        f"score, {dropped.without_id} without {ids}, {dropped.without_pose} further than "
+        f"{tolerance:g} s from a pose (boxes {table.timestamp.min():.6f} to "
+        f"{table.timestamp.max():.6f} s, poses {times[0]:.6f} to {times[-1]:.6f} s), "
+        f"{dropped.repeated} repeated, {sum(dropped.few_boxes.values())} of objects with fewer "
+        f"than {FEWEST_BOXES}"
+    )
