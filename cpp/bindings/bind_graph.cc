@@ -1,0 +1,64 @@
+#include <pybind11/eigen.h>
+
+#include "bindings.h"
+#include "dqslam/graph.h"
+
+namespace py = pybind11;
+using namespace pybind11::literals;
+
+namespace dqslam {
+
+void BindGraph(py::module_& m) {
+  py::class_<Graph>(m, "Graph", "The problem as plain tables; ids are row numbers. Immutable.")
+      .def(py::init([](PoseModel pose_model, const Camera& camera, RowMatrix initial_poses,
+                       IndexVector odometry_from, IndexVector odometry_to, RowMatrix odometry,
+                       RowMatrix odometry_covariance, IndexVector box_pose, IndexVector box_object,
+                       RowMatrix boxes, RowMatrix box_covariance, IndexVector position_pose,
+                       IndexVector position_object, RowMatrix positions,
+                       RowMatrix position_covariance, Eigen::VectorXd log_size_mean,
+                       Eigen::VectorXd log_size_sigma) {
+             Graph graph{pose_model,
+                         camera,
+                         std::move(initial_poses),
+                         {odometry_from, odometry_to, odometry, odometry_covariance},
+                         {box_pose, box_object, boxes, box_covariance},
+                         {position_pose, position_object, positions, position_covariance},
+                         {log_size_mean, log_size_sigma}};
+             Validate(graph, /*poses_known=*/true);  // solve() asks for odometry where it needs it
+             return graph;
+           }),
+           "pose_model"_a, "camera"_a, py::kw_only(), "initial_poses"_a, "odometry_from"_a,
+           "odometry_to"_a, "odometry"_a, "odometry_covariance"_a, "box_pose"_a, "box_object"_a,
+           "boxes"_a, "box_covariance"_a, "position_pose"_a = IndexVector(),
+           "position_object"_a = IndexVector(), "positions"_a = RowMatrix(0, 3),
+           "position_covariance"_a = RowMatrix(0, 9), "log_size_mean"_a, "log_size_sigma"_a,
+           "Shapes, with d the size of a pose and k of its tangent: initial_poses (n, d); odometry "
+           "(m, d), to_in_from, with covariance (m, k * k); boxes (b, 4) undistorted pixels with "
+           "covariance (b, 16); positions (p, 3) object_in_robot, metres, with covariance (p, 9); "
+           "log_size_mean and log_size_sigma (o,), of semi-axes in log metres.")
+      .def_readonly("pose_model", &Graph::pose_model)
+      .def_readonly("camera", &Graph::camera)
+      .def_readonly("initial_poses", &Graph::initial_poses, "Shape (n, d).")
+      .def_property_readonly("odometry_from", [](const Graph& g) { return g.odometry.from; })
+      .def_property_readonly("odometry_to", [](const Graph& g) { return g.odometry.to; })
+      .def_property_readonly("odometry", [](const Graph& g) { return g.odometry.relative; })
+      .def_property_readonly("odometry_covariance",
+                             [](const Graph& g) { return g.odometry.covariance; })
+      .def_property_readonly("box_pose", [](const Graph& g) { return g.boxes.pose; })
+      .def_property_readonly("box_object", [](const Graph& g) { return g.boxes.object; })
+      .def_property_readonly("boxes", [](const Graph& g) { return g.boxes.box; })
+      .def_property_readonly("box_covariance", [](const Graph& g) { return g.boxes.covariance; })
+      .def_property_readonly("position_pose", [](const Graph& g) { return g.positions.pose; })
+      .def_property_readonly("position_object", [](const Graph& g) { return g.positions.object; })
+      .def_property_readonly("positions",
+                             [](const Graph& g) { return g.positions.object_in_robot; })
+      .def_property_readonly("position_covariance",
+                             [](const Graph& g) { return g.positions.covariance; })
+      .def_property_readonly("log_size_mean", [](const Graph& g) { return g.size_prior.log_mean; })
+      .def_property_readonly("log_size_sigma",
+                             [](const Graph& g) { return g.size_prior.log_sigma; })
+      .def_property_readonly("num_poses", &Graph::num_poses)
+      .def_property_readonly("num_objects", &Graph::num_objects);
+}
+
+}  // namespace dqslam

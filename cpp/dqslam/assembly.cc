@@ -1,0 +1,149 @@
+#include "dqslam/assembly.h"
+
+#include <ceres/loss_function.h>
+#include <ceres/problem.h>
+
+#include "dqslam/costs/algebraic.h"
+#include "dqslam/costs/box.h"
+#include "dqslam/costs/odometry.h"
+#include "dqslam/costs/relative_position.h"
+#include "dqslam/costs/size_prior.h"
+#include "dqslam/costs/tangent.h"
+#include "dqslam/dispatch.h"
+#include "dqslam/manifolds.h"
+
+namespace dqslam {
+namespace {
+
+template <typename Pose, typename Landmark>
+class Assembler {
+ public:
+  Assembler(const PreparedGraph& prepared, const SolveOptions& options, const Stage& stage,
+            State* state, ceres::Problem* problem)
+      : prepared_(prepared),
+        graph_(prepared.graph),
+        options_(options),
+        stage_(stage),
+        state_(*state),
+        problem_(*problem) {}
+
+  void Run() {
+    AddPoses();
+    AddOdometry();
+    std::vector<bool> takes_part(graph_.num_objects(), false);
+    for (const int row : stage_.boxes) {
+      AddBox(row);
+      takes_part[graph_.boxes.object[row]] = true;
+    }
+    AddPositions(takes_part);
+    if (Landmark::kModel == LandmarkModel::kEllipsoid) AddSizePriors(takes_part);
+  }
+
+ private:
+  double* PoseAt(int row) { return state_.poses.row(row).data(); }
+  double* LandmarkAt(int row) { return state_.landmarks.row(row).data(); }
+
+  void AddPoses() {
+    auto* manifold = new PoseManifold<Pose>;  // the problem owns it, once for all poses
+    for (int pose = 0; pose < stage_.end_pose; ++pose) {
+      problem_.AddParameterBlock(PoseAt(pose), Pose::kSize, manifold);
+      if (pose < stage_.first_free_pose) problem_.SetParameterBlockConstant(PoseAt(pose));
+    }
+  }
+
+  void AddOdometry() {
+    const OdometryTable& odometry = graph_.odometry;
+    for (int row = 0; row < odometry.size(); ++row) {
+      const int from = odometry.from[row], to = odometry.to[row];
+      const bool constant = std::max(from, to) < stage_.first_free_pose;
+      if (constant || std::max(from, to) >= stage_.end_pose) continue;
+      using Relative = Eigen::Matrix<double, Pose::kSize, 1>;
+      using Square = Eigen::Matrix<double, Pose::kTangentSize, Pose::kTangentSize>;
+      problem_.AddResidualBlock(
+          OdometryCost<Pose>::Create(Relative(odometry.relative.row(row).transpose()),
+                                     Square(prepared_.odometry_sqrt_information[row])),
+          nullptr, PoseAt(from), PoseAt(to));
+    }
+  }
+
+  void AddBox(int row) {
+    const int pose = graph_.boxes.pose[row], object = graph_.boxes.object[row];
+    problem_.AddResidualBlock(MakeBoxCost(row), MakeLoss(), PoseAt(pose), LandmarkAt(object));
+  }
+
+  ceres::CostFunction* MakeBoxCost(int row) {
+    const Eigen::Vector4d observed = graph_.boxes.box.row(row);
+    const Eigen::Matrix4d& weight = prepared_.box_sqrt_information[row];
+    const Residual residual = stage_.residual;
+    if (residual == Residual::kAlgebraic || residual == Residual::kAlgebraicNormalized) {
+      const Eigen::Matrix4d algebraic_weight =
+          Eigen::Matrix4d::Identity() / options_.algebraic_sigma;
+      return AlgebraicCost<Pose, Landmark>::Create(
+          prepared_.mount, BoxLines(graph_.camera, observed), algebraic_weight,
+          residual == Residual::kAlgebraicNormalized);
+    }
+    const Surface<double> surface =
+        ToCamera(LocateCamera<Pose>(PoseAt(graph_.boxes.pose[row]), prepared_.mount),
+                 Landmark::Unpack(LandmarkAt(graph_.boxes.object[row])));
+    Eigen::Vector4d predicted;
+    if (residual == Residual::kBox && ProjectToBox(surface, graph_.camera, &predicted)) {
+      return BoxCost<Pose, Landmark>::Create(graph_.camera, prepared_.mount, observed, weight);
+    }
+    // Never closer than the object is thick, so that an object behind the camera still has a scale.
+    const double thickness = std::sqrt(std::max(surface.shape(2, 2), 1e-12));
+    const double depth = std::max(surface.center.z(), 1.5 * thickness);
+    return TangentCost<Pose, Landmark>::Create(graph_.camera, prepared_.mount, observed, weight,
+                                               depth);
+  }
+
+  ceres::LossFunction* MakeLoss() const {
+    switch (options_.loss) {
+      case Loss::kNone:
+        return nullptr;
+      case Loss::kHuber:
+        return new ceres::HuberLoss(options_.loss_scale);
+      case Loss::kCauchy:
+        return new ceres::CauchyLoss(options_.loss_scale);
+    }
+    return nullptr;
+  }
+
+  void AddPositions(const std::vector<bool>& takes_part) {
+    const PositionTable& positions = graph_.positions;
+    for (int row = 0; row < positions.size(); ++row) {
+      const int pose = positions.pose[row], object = positions.object[row];
+      if (pose >= stage_.end_pose || !takes_part[object]) continue;
+      problem_.AddResidualBlock(RelativePositionCost<Pose, Landmark>::Create(
+                                    Eigen::Vector3d(positions.object_in_robot.row(row)),
+                                    prepared_.position_sqrt_information[row]),
+                                nullptr, PoseAt(pose), LandmarkAt(object));
+    }
+  }
+
+  void AddSizePriors(const std::vector<bool>& takes_part) {
+    for (int object = 0; object < graph_.num_objects(); ++object) {
+      if (!takes_part[object]) continue;
+      problem_.AddResidualBlock(SizePriorCost::Create(graph_.size_prior.log_mean[object],
+                                                      graph_.size_prior.log_sigma[object]),
+                                nullptr, LandmarkAt(object));
+    }
+  }
+
+  const PreparedGraph& prepared_;
+  const Graph& graph_;
+  const SolveOptions& options_;
+  const Stage& stage_;
+  State& state_;
+  ceres::Problem& problem_;
+};
+
+}  // namespace
+
+void Assemble(const PreparedGraph& prepared, const SolveOptions& options, const Stage& stage,
+              State* state, ceres::Problem* problem) {
+  Dispatch(prepared.graph.pose_model, options.landmark_model, [&](auto pose, auto landmark) {
+    Assembler<decltype(pose), decltype(landmark)>(prepared, options, stage, state, problem).Run();
+  });
+}
+
+}  // namespace dqslam

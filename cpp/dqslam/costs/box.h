@@ -1,0 +1,32 @@
+// Detection against the projected ellipsoid:  r = W (box(C*) - observed),  C* = P Q* P^T.
+// [S&M17] sec. 3.3, with the exact bounding box of the outline.
+//
+// Blocks: world_from_robot [d], landmark [9].  Residual: [4], in sigmas.
+// Returns false, so that Ceres rejects the step, unless the object is strictly in front.
+#pragma once
+
+#include "dqslam/costs/cost.h"
+#include "dqslam/ellipsoid.h"
+#include "dqslam/whitening.h"
+
+namespace dqslam {
+
+template <typename Pose, typename Landmark>
+struct BoxCost : AutoDiffCost<BoxCost<Pose, Landmark>, kBoxSize, Pose::kSize, kLandmarkSize> {
+  Camera camera;
+  Mount mount;
+  Eigen::Vector4d observed;          ///< pixels
+  Eigen::Matrix4d sqrt_information;  ///< 1 / pixels
+
+  template <typename T>
+  bool operator()(const T* pose, const T* landmark, T* residual) const {
+    Vector4<T> predicted;
+    const Surface<T> surface =
+        ToCamera(LocateCamera<Pose>(pose, mount), Landmark::Unpack(landmark));
+    if (!ProjectToBox(surface, camera, &predicted)) return false;
+    Whiten<kBoxSize, T>(sqrt_information, predicted - observed.cast<T>(), residual);
+    return true;
+  }
+};
+
+}  // namespace dqslam

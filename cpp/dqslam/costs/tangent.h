@@ -1,0 +1,39 @@
+// Signed distance of the ellipsoid to the plane behind each edge of the box:
+//   r_k = (n_k . p + |L^T n_k|) focal / depth,   n = (1, 0, -x) for the right edge, and so on.
+// The algebraic residual of [S&M17] eq. (5) is (n.p + h)(n.p - h), h = |L^T n|: this is the factor
+// that vanishes where the plane touches the object from *outside the box*; the other one vanishes
+// on the object's far side.
+//
+// Blocks: world_from_robot [d], landmark [9].  Residual: [4], in sigmas.
+// The scale focal / depth turns metres into pixels; `depth` is frozen while a stage runs.
+// Affine in the centre and defined everywhere for ellipsoids: behind, beside and inside too.
+// Returns false where n^T S n is not positive (only a dual quadric that is no ellipsoid).
+#pragma once
+
+#include "dqslam/costs/cost.h"
+#include "dqslam/ellipsoid.h"
+#include "dqslam/whitening.h"
+
+namespace dqslam {
+
+template <typename Pose, typename Landmark>
+struct TangentCost
+    : AutoDiffCost<TangentCost<Pose, Landmark>, kBoxSize, Pose::kSize, kLandmarkSize> {
+  Camera camera;
+  Mount mount;
+  Eigen::Vector4d observed;          ///< pixels
+  Eigen::Matrix4d sqrt_information;  ///< 1 / pixels
+  double depth;                      ///< metres
+
+  template <typename T>
+  bool operator()(const T* pose, const T* landmark, T* residual) const {
+    const Surface<T> surface =
+        ToCamera(LocateCamera<Pose>(pose, mount), Landmark::Unpack(landmark));
+    Vector4<T> error;
+    if (!TangentDistances(surface, camera, observed, depth, &error)) return false;
+    Whiten(sqrt_information, error, residual);
+    return true;
+  }
+};
+
+}  // namespace dqslam

@@ -1,0 +1,86 @@
+// The problem as plain tables, and the answer.  Ids are row numbers.  No Ceres here.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "dqslam/blocks.h"
+#include "dqslam/camera.h"
+#include "dqslam/pose.h"
+
+namespace dqslam {
+
+/// Relative poses between two rows of `initial_poses`.  d pose size, k tangent size.
+struct OdometryTable {
+  IndexVector from, to;
+  RowMatrix relative;    ///< (n, d): from_pose^-1 o to_pose
+  RowMatrix covariance;  ///< (n, k * k), of (from o relative) (-) to
+  int size() const { return static_cast<int>(from.size()); }
+};
+
+/// Detections whose object is known.
+struct BoxTable {
+  IndexVector pose, object;
+  RowMatrix box;         ///< (n, 4) undistorted pixels
+  RowMatrix covariance;  ///< (n, 16) pixels^2
+  int size() const { return static_cast<int>(pose.size()); }
+};
+
+/// Measured positions of object centres in the robot frame, [S&M17] eq. (8).
+struct PositionTable {
+  IndexVector pose, object;
+  RowMatrix object_in_robot;  ///< (n, 3) metres
+  RowMatrix covariance;       ///< (n, 9) metres^2
+  int size() const { return static_cast<int>(pose.size()); }
+};
+
+/// Gaussian prior on the logarithm of every object's semi-axes [log metres].
+struct SizePriorTable {
+  Eigen::VectorXd log_mean, log_sigma;  ///< one row an object
+};
+
+struct Graph {
+  PoseModel pose_model = PoseModel::kSe2;
+  Camera camera;
+  RowMatrix initial_poses;  ///< (poses, d): dead reckoning, or the known poses when mapping
+  OdometryTable odometry;
+  BoxTable boxes;
+  PositionTable positions;
+  SizePriorTable size_prior;
+
+  int num_poses() const { return static_cast<int>(initial_poses.rows()); }
+  int num_objects() const { return static_cast<int>(size_prior.log_mean.size()); }
+  int pose_size() const { return pose_model == PoseModel::kSe2 ? Se2::kSize : Se3::kSize; }
+  int tangent_size() const {
+    return pose_model == PoseModel::kSe2 ? Se2::kTangentSize : Se3::kTangentSize;
+  }
+};
+
+/// Throws std::invalid_argument naming the table and the row for NaN or infinite numbers, wrong
+/// shapes, ids out of range, inverted boxes, covariances that are not positive definite, quaternions
+/// that are not unit, non-positive sigmas, poses without odometry from an earlier pose (unless
+/// `poses_known`) and objects that no box shows.
+void Validate(const Graph& graph, bool poses_known);
+
+/// Poses and landmarks: where a solve starts, stands and ends.
+struct State {
+  RowMatrix poses;      ///< (poses, d)
+  RowMatrix landmarks;  ///< (objects, 9) in the landmark model of the solve
+};
+
+struct Summary {
+  double initial_cost = 0;         ///< half the sum of squared residuals, in sigmas, after the loss
+  double final_cost = 0;           ///< likewise
+  int iterations = 0;              ///< of all stages
+  int rejected_steps = 0;          ///< of all stages
+  double gradient_norm_start = 0;  ///< infinity norm, at the start of the last stage
+  double gradient_norm_end = 0;    ///< likewise, at its end
+  double seconds = 0;              ///< wall clock, all stages
+  bool converged = false;          ///< the last stage met a stopping test and accepted a step
+  std::string message;             ///< how it ended, in words
+};
+
+/// A few lines for people.
+std::string ToString(const Summary& summary);
+
+}  // namespace dqslam

@@ -1,0 +1,120 @@
+#include "dqslam/optimize.h"
+
+#include <ceres/problem.h>
+#include <ceres/solver.h>
+#include <omp.h>
+
+#include <limits>
+
+#include "dqslam/assembly.h"
+#include "dqslam/dispatch.h"
+
+namespace dqslam {
+namespace {
+
+// Debian's CHOLMOD opens OpenMP threads of its own, which cost more than they give at this size.
+class SingleOpenMpThread {
+ public:
+  SingleOpenMpThread() : levels_(omp_get_max_active_levels()) { omp_set_max_active_levels(0); }
+  ~SingleOpenMpThread() { omp_set_max_active_levels(levels_); }
+
+ private:
+  int levels_;
+};
+
+class MonitorCallback : public ceres::IterationCallback {
+ public:
+  explicit MonitorCallback(const Monitor& monitor) : monitor_(monitor) {}
+  ceres::CallbackReturnType operator()(const ceres::IterationSummary& iteration) override {
+    if (iteration.step_is_valid || iteration.iteration == 0) {
+      last_gradient_norm = iteration.gradient_max_norm;
+    }
+    if (iteration.iteration == 0) first_gradient_norm = iteration.gradient_max_norm;
+    if (!monitor_ || monitor_()) return ceres::SOLVER_CONTINUE;
+    stopped = true;
+    return ceres::SOLVER_ABORT;
+  }
+
+  bool stopped = false;
+  double first_gradient_norm = 0, last_gradient_norm = 0;
+
+ private:
+  const Monitor& monitor_;
+};
+
+ceres::Solver::Options CeresOptions(const SolveOptions& options, const Stage& stage) {
+  ceres::Solver::Options ceres_options;
+  ceres_options.trust_region_strategy_type = stage.minimizer == Minimizer::kDogleg
+                                                 ? ceres::DOGLEG
+                                                 : ceres::LEVENBERG_MARQUARDT;
+  ceres_options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
+  ceres_options.max_num_iterations = stage.max_iterations;
+  ceres_options.function_tolerance = options.function_tolerance;
+  ceres_options.gradient_tolerance = 1e-12;
+  ceres_options.parameter_tolerance = 1e-12;
+  // An invalid step is a step into impossible geometry: shrink and go on.
+  ceres_options.max_num_consecutive_invalid_steps = 50;
+  ceres_options.num_threads = 1;
+  ceres_options.logging_type = ceres::SILENT;
+  return ceres_options;
+}
+
+std::string Words(const ceres::Solver::Summary& summary) {
+  if (summary.num_successful_steps == 0 && summary.num_unsuccessful_steps > 0) {
+    return "every step was rejected: " + summary.message;
+  }
+  return summary.message;
+}
+
+}  // namespace
+
+Summary Optimize(const PreparedGraph& prepared, const SolveOptions& options, const Stage& stage,
+                 const Monitor& monitor, State* state) {
+  const SingleOpenMpThread single_thread;
+  ceres::Problem problem;
+  Assemble(prepared, options, stage, state, &problem);
+  ceres::Solver::Options ceres_options = CeresOptions(options, stage);
+  MonitorCallback callback(monitor);
+  ceres_options.callbacks.push_back(&callback);
+
+  ceres::Solver::Summary ceres_summary;
+  ceres::Solve(ceres_options, &problem, &ceres_summary);
+  if (callback.stopped) throw Interrupted();
+
+  Summary summary;
+  summary.initial_cost = ceres_summary.initial_cost;
+  summary.final_cost = ceres_summary.final_cost;
+  summary.iterations = static_cast<int>(ceres_summary.iterations.size()) - 1;
+  summary.rejected_steps = ceres_summary.num_unsuccessful_steps;
+  summary.gradient_norm_start = callback.first_gradient_norm;
+  summary.gradient_norm_end = callback.last_gradient_norm;
+  summary.seconds = ceres_summary.total_time_in_seconds;
+  summary.converged = ceres_summary.termination_type == ceres::CONVERGENCE &&
+                      (ceres_summary.num_successful_steps > 0 || summary.iterations == 0);
+  summary.message = Words(ceres_summary);
+  return summary;
+}
+
+Eigen::VectorXd BoxCosts(const PreparedGraph& prepared, const SolveOptions& options,
+                         const State& state) {
+  const Graph& graph = prepared.graph;
+  Eigen::VectorXd costs(graph.boxes.size());
+  Dispatch(graph.pose_model, options.landmark_model, [&](auto pose_model, auto landmark) {
+    using Pose = decltype(pose_model);
+    using Landmark = decltype(landmark);
+    for (int row = 0; row < graph.boxes.size(); ++row) {
+      const double* pose = state.poses.row(graph.boxes.pose[row]).data();
+      const double* parameters = state.landmarks.row(graph.boxes.object[row]).data();
+      Eigen::Vector4d predicted;
+      const bool defined = ProjectToBox(
+          ToCamera(LocateCamera<Pose>(pose, prepared.mount), Landmark::Unpack(parameters)),
+          graph.camera, &predicted);
+      const Eigen::Vector4d error = predicted - graph.boxes.box.row(row).transpose();
+      costs[row] = defined ? 0.5 * (prepared.box_sqrt_information[row] * error).squaredNorm()
+                           : std::numeric_limits<double>::infinity();
+    }
+  });
+  return costs;
+}
+
+}  // namespace dqslam

@@ -1,0 +1,41 @@
+// One stage of estimation: some poses, some boxes, one residual, one minimiser.
+#pragma once
+
+#include <functional>
+#include <stdexcept>
+#include <vector>
+
+#include "dqslam/options.h"
+#include "dqslam/prepared.h"
+
+namespace dqslam {
+
+/// Called once an iteration; false asks to stop.
+using Monitor = std::function<bool()>;
+
+/// Thrown when a monitor asked to stop.
+struct Interrupted : std::runtime_error {
+  Interrupted() : std::runtime_error("interrupted") {}
+};
+
+/// Which part of the graph takes part, and how.
+struct Stage {
+  int first_free_pose = 1;  ///< poses before it are constant
+  int end_pose = 0;         ///< poses from it on take no part
+  std::vector<int> boxes;   ///< rows that take part; their objects do too
+  Residual residual = Residual::kTangent;  ///< not kTangentThenBox
+  Minimizer minimizer = Minimizer::kDogleg;
+  int max_iterations = 100;
+};
+
+/// Minimises from `state` and writes the result there.  Where the box residual is undefined at the
+/// start of the stage, that box uses the tangent residual.  Throws Interrupted.
+Summary Optimize(const PreparedGraph& prepared, const SolveOptions& options, const Stage& stage,
+                 const Monitor& monitor, State* state);
+
+/// Half the squared Mahalanobis distance of each box from its prediction; infinite where the object
+/// is not strictly in front.
+Eigen::VectorXd BoxCosts(const PreparedGraph& prepared, const SolveOptions& options,
+                         const State& state);
+
+}  // namespace dqslam

@@ -1,0 +1,54 @@
+// What a caller may choose.  Every default lives here and nowhere else.
+#pragma once
+
+#include "dqslam/ellipsoid.h"
+
+namespace dqslam {
+
+enum class Mode {
+  kSlam,     ///< poses and objects are unknown; the first pose is fixed
+  kMapping,  ///< poses are known and fixed, as in Rubino et al. 2017
+};
+
+enum class Residual {
+  kAlgebraic,            ///< l^T P Q* P^T l, as published
+  kAlgebraicNormalized,  ///< the same, divided by (P Q* P^T)_33
+  kTangent,              ///< distance to the planes behind the edges
+  kBox,                  ///< edges of the exact bounding box, in pixels
+  kTangentThenBox,       ///< tangent to get there, box to finish
+};
+
+enum class Start {
+  kIdentity,   ///< [S&M17]: Q* = I; for the ellipsoid model the unit sphere at the origin
+  kSvd,        ///< [S&M17] eqs. (9), (10); where it is no ellipsoid, the sphere
+  kSizePrior,  ///< back-projected to the depth at which the prior size fits the box
+  kSphere,     ///< linear in centre and radius, from the tangent residual
+};
+
+enum class Schedule {
+  kBatch,  ///< all poses at once, from the initial poses
+  kGrow,   ///< a few poses at a time along the trajectory
+};
+
+enum class Loss { kNone, kHuber, kCauchy };
+
+enum class Minimizer { kLevenbergMarquardt, kDogleg };
+
+struct SolveOptions {
+  Mode mode = Mode::kSlam;
+  Residual residual = Residual::kTangentThenBox;
+  LandmarkModel landmark_model = LandmarkModel::kEllipsoid;
+  Start start = Start::kSphere;
+  Schedule schedule = Schedule::kGrow;
+  Loss loss = Loss::kNone;                   ///< on whole boxes; odometry is always quadratic
+  double loss_scale = 2.0;                   ///< sigmas of a whole box
+  double algebraic_sigma = 1.0;              ///< of both algebraic residuals, their own unit
+  Minimizer minimizer = Minimizer::kDogleg;  ///< of the last stage
+  int max_iterations = 300;                  ///< of each batch stage
+  double function_tolerance = 1e-10;         ///< stop when |change of cost| / cost falls below
+  int grow_poses = 5;                        ///< poses added at a time
+  int grow_iterations = 10;                  ///< Levenberg-Marquardt steps after each addition
+  int grow_min_views = 4;                    ///< boxes an object needs before it is started
+};
+
+}  // namespace dqslam

@@ -1,0 +1,142 @@
+#include "dqslam/solve.h"
+
+#include <chrono>
+#include <cmath>
+#include <numeric>
+
+#include "dqslam/grow.h"
+
+namespace dqslam {
+namespace {
+
+void ValidateOptions(const SolveOptions& options) {
+  const auto require = [](bool good, const char* what) {
+    if (!good) throw std::invalid_argument(what);
+  };
+  require(options.algebraic_sigma > 0, "algebraic_sigma must be positive");
+  require(options.loss_scale > 0, "loss_scale must be positive");
+  require(options.max_iterations > 0, "max_iterations must be positive");
+  require(options.function_tolerance > 0, "function_tolerance must be positive");
+  require(options.grow_poses > 0, "grow_poses must be positive");
+  require(options.grow_iterations > 0, "grow_iterations must be positive");
+  require(options.grow_min_views > 0, "grow_min_views must be positive");
+}
+
+void ValidateStart(const Graph& graph, const State& start) {
+  const bool shapes_match =
+      start.poses.rows() == graph.num_poses() && start.poses.cols() == graph.pose_size() &&
+      start.landmarks.rows() == graph.num_objects() && start.landmarks.cols() == kLandmarkSize;
+  if (!shapes_match || !start.poses.allFinite() || !start.landmarks.allFinite()) {
+    throw std::invalid_argument("start: need finite poses (" + std::to_string(graph.num_poses()) +
+                                ", " + std::to_string(graph.pose_size()) + ") and landmarks (" +
+                                std::to_string(graph.num_objects()) + ", 9)");
+  }
+}
+
+void Append(const Summary& stage, Summary* total) {
+  const int iterations = total->iterations + stage.iterations;
+  const int rejected = total->rejected_steps + stage.rejected_steps;
+  const double initial_cost = total->message.empty() ? stage.initial_cost : total->initial_cost;
+  *total = stage;
+  total->initial_cost = initial_cost;
+  total->iterations = iterations;
+  total->rejected_steps = rejected;
+}
+
+class Solver {
+ public:
+  Solver(const Graph& graph, const SolveOptions& options, const Monitor& monitor)
+      : graph_(graph),
+        options_(options),
+        monitor_(monitor),
+        prepared_(graph, options.mode == Mode::kMapping) {}
+
+  /// Of every object's linear fit at the initial poses; NaN where it has fewer than 3 views.
+  RowMatrix SvdSingularValues() const {
+    State state{graph_.initial_poses, RowMatrix()};
+    RowMatrix values = RowMatrix::Constant(graph_.num_objects(), 10, std::nan(""));
+    for (int object = 0; object < graph_.num_objects(); ++object) {
+      const std::vector<View> views =
+          ViewsOf(prepared_, state, prepared_.boxes_of_object[object]);
+      if (views.size() >= 3) values.row(object) = FitSvd(graph_.camera, views).singular_values;
+    }
+    return values;
+  }
+
+  Summary Run(const std::optional<State>& start, State* state) {
+    Summary summary;
+    if (start) {
+      *state = *start;
+    } else {
+      state->poses = graph_.initial_poses;
+      state->landmarks = RowMatrix::Zero(graph_.num_objects(), kLandmarkSize);
+      if (options_.schedule == Schedule::kGrow && options_.mode == Mode::kSlam) {
+        summary = Grow(prepared_, options_, monitor_, state);
+      } else {
+        StartAll(state);
+      }
+      if (options_.residual == Residual::kTangentThenBox) {
+        Append(Batch(Residual::kTangent, state), &summary);
+      }
+    }
+    const Residual last = options_.residual == Residual::kTangentThenBox ? Residual::kBox
+                                                                         : options_.residual;
+    Append(Batch(last, state), &summary);
+    return summary;
+  }
+
+ private:
+  void StartAll(State* state) {
+    for (int object = 0; object < graph_.num_objects(); ++object) {
+      state->landmarks.row(object) =
+          StartObject(prepared_, options_, *state, object, prepared_.boxes_of_object[object]);
+    }
+  }
+
+  Summary Batch(Residual residual, State* state) {
+    Stage stage;
+    stage.first_free_pose = options_.mode == Mode::kMapping ? graph_.num_poses() : 1;
+    stage.end_pose = graph_.num_poses();
+    stage.boxes.resize(graph_.boxes.size());
+    std::iota(stage.boxes.begin(), stage.boxes.end(), 0);
+    stage.residual = residual;
+    stage.minimizer = options_.minimizer;
+    stage.max_iterations = options_.max_iterations;
+    return Optimize(prepared_, options_, stage, monitor_, state);
+  }
+
+  const Graph& graph_;
+  const SolveOptions& options_;
+  const Monitor& monitor_;
+  const PreparedGraph prepared_;
+};
+
+}  // namespace
+
+Solution Solve(const Graph& graph, const SolveOptions& options, const std::optional<State>& start,
+               const Monitor& monitor) {
+  const auto begin = std::chrono::steady_clock::now();
+  ValidateOptions(options);
+  if (start) ValidateStart(graph, *start);
+  State state;
+  Solution solution;
+  Solver solver(graph, options, monitor);
+  solution.summary = solver.Run(start, &state);
+  solution.svd_singular_values = options.start == Start::kSvd
+                                     ? solver.SvdSingularValues()
+                                     : RowMatrix::Constant(graph.num_objects(), 10, std::nan(""));
+  solution.poses = state.poses;
+  solution.landmarks = state.landmarks;
+  solution.dual_quadrics = state.landmarks;
+  if (options.landmark_model == LandmarkModel::kEllipsoid) {
+    for (Eigen::Index row = 0; row < state.landmarks.rows(); ++row) {
+      solution.dual_quadrics.row(row) =
+          DualQuadricFromEllipsoid(state.landmarks.row(row).transpose());
+    }
+  }
+  const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - begin;
+  solution.summary.seconds = elapsed.count();
+  return solution;
+}
+
+}  // namespace dqslam
