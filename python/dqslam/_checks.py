@@ -1,0 +1,74 @@
+"""Checks of arrays that name the array and the row in what they raise."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+
+def first_row(bad: Bools) -> int | None:
+    """Return the first row with any bad entry, None when all are good; shape (n, ...)."""
+    if not bad.any():
+        return None
+    return int(np.argmax(bad.reshape(len(bad), -1).any(axis=1)))
+
+
+def reject_rows(name: str, bad: Bools, reason: str, values: ArrayLike | None = None) -> None:
+    """Raise a ValueError that names the first bad row; shape of bad (n, ...)."""
+    row = first_row(bad)
+    if row is None:
+        return
+    shown = "" if values is None else f": {np.asarray(values)[row].tolist()}"
+    raise ValueError(f"{name} row {row}: {reason}{shown}")
+
+
+def _check_shape(name: str, array: NDArray[np.generic], shape: Sequence[int | None]) -> None:
+    fits = array.ndim == len(shape) and all(
+        want is None or have == want for have, want in zip(array.shape, shape, strict=True)
+    )
+    if not fits:
+        wanted = ", ".join("n" if size is None else str(size) for size in shape)
+        raise ValueError(f"{name}: expected shape ({wanted}), got {array.shape}")
+
+
+def as_floats(name: str, values: ArrayLike, shape: Sequence[int | None]) -> Floats:
+    """Return a read-only float copy of the given shape (None: any size), all entries finite."""
+    try:
+        array = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{name}: not an array of numbers ({error})") from None
+    if array.size == 0 and None in shape:
+        array = array.reshape([0 if size is None else size for size in shape])
+    _check_shape(name, array, shape)
+    rows = array.reshape(len(array), -1) if shape[0] is None else array.reshape(1, -1)
+    reject_rows(name, ~np.isfinite(rows), "not finite", rows)
+    array.setflags(write=False)
+    return array
+
+
+def as_ints(name: str, values: ArrayLike, size: int | None = None) -> Ints:
+    """Return a read-only integer copy, shape (size,); floats are refused unless whole."""
+    given = np.atleast_1d(np.asarray(values))
+    if given.size and given.dtype.kind not in "iu":
+        if given.dtype.kind != "f":
+            raise ValueError(f"{name}: not an array of whole numbers")
+        reject_rows(name, ~(given == np.round(given)), "not a whole number", given)
+    array = given.astype(np.int64)
+    _check_shape(name, array, [size])
+    array.setflags(write=False)
+    return array
+
+
+def as_covariances(name: str, values: ArrayLike, count: int, size: int) -> Floats:
+    """Return read-only covariances, shape (count, size, size), symmetric positive definite."""
+    array = as_floats(name, values, [None, size, size])
+    _check_shape(name, array, [count, size, size])
+    asymmetric = np.abs(array - array.transpose(0, 2, 1)) > 1e-9 * np.abs(array).max(initial=1e-300)
+    reject_rows(name, asymmetric, "covariance is not symmetric")
+    smallest = np.linalg.eigvalsh(array)[:, :1] if count else np.zeros((0, 1))
+    reject_rows(name, smallest <= 0.0, "covariance is not positive definite")
+    return array

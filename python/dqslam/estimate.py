@@ -1,0 +1,54 @@
+"""What an estimator answers: plain data."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dqslam._checks import Bools, Floats, Ints
+from dqslam._core import Camera, PoseModel
+
+
+def quadric_shapes(dual_quadrics: Floats) -> Floats:
+    """Return S = c c^T - Q*_33 [m^2], shape (o, 3, 3), of rows q1 .. q9, shape (o, 9)."""
+    upper_left = dual_quadrics[:, [[0, 1, 2], [1, 4, 5], [2, 5, 7]]]
+    centers = dual_quadrics[:, [3, 6, 8]]
+    return np.asarray(centers[:, :, None] * centers[:, None, :] - upper_left)
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """Poses and objects as estimated, and the poses it started from."""
+
+    pose_model: PoseModel
+    camera: Camera
+    timestamps: Floats
+    """Seconds, shape (n,)."""
+    poses: Floats
+    """world_from_robot, shape (n, d)."""
+    initial_poses: Floats
+    """world_from_robot by odometry alone, shape (n, d)."""
+    object_ids: Ints
+    """Of the mapped objects, ascending, shape (o,)."""
+    class_names: tuple[str, ...]
+    """One per mapped object."""
+    observations: Ints
+    """Boxes per mapped object, shape (o,)."""
+    dual_quadrics: Floats
+    """q1 .. q9 with Q*(4,4) = 1, shape (o, 9)."""
+    ellipsoids: Floats
+    """Centre and log-Cholesky shape, shape (o, 9); rows of NaN where q is no ellipsoid."""
+
+    @property
+    def centers(self) -> Floats:
+        """Centres of the objects in the world, metres, shape (o, 3): (q4, q7, q9)."""
+        return self.dual_quadrics[:, [3, 6, 8]]
+
+    @property
+    def shapes(self) -> Floats:
+        """Shapes S of the objects, square metres, (o, 3, 3); of any signature."""
+        return quadric_shapes(self.dual_quadrics)
+
+    @property
+    def is_ellipsoid(self) -> Bools:
+        """Whether each mapped object is a real ellipsoid, shape (o,)."""
+        return np.asarray(np.isfinite(self.ellipsoids).all(axis=1))

@@ -1,0 +1,174 @@
+"""From a recording to the plain arrays the core solves, and back to an estimate."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dqslam import _core
+from dqslam._checks import Floats, Ints, as_floats, reject_rows
+from dqslam.estimate import Estimate
+from dqslam.recording import Detections, Recording, RelativePositions
+
+
+@dataclass(frozen=True)
+class BoxNoise:
+    """How far a box edge lies from the outline of an ellipsoid.
+
+    sigma = hypot(pixels, relative * side of the box across that edge): a detector's noise, and a
+    part that grows with the box because real objects, cubes among them, are no ellipsoids.
+    """
+
+    pixels: float = 2.0
+    """Sigma, pixels."""
+    relative: float = 0.05
+    """Sigma over side length of the box."""
+
+    def covariance(self, box: Floats) -> Floats:
+        """Return the covariance [px^2] of u_min, v_min, u_max, v_max, shape (b, 4, 4)."""
+        if not (np.isfinite([self.pixels, self.relative]).all() and self.pixels > 0.0):
+            raise ValueError(f"box noise: expected positive, finite pixels, got {self}")
+        if self.relative < 0.0:
+            raise ValueError(f"box noise: relative is negative: {self}")
+        side = np.tile(box[:, 2:] - box[:, :2], (1, 2))
+        variance = self.pixels**2 + (self.relative * side) ** 2
+        return np.asarray(variance[:, :, None] * np.eye(4))
+
+
+@dataclass(frozen=True)
+class SizePrior:
+    """How large objects are before any is seen: a log-normal semi-axis, broad on purpose."""
+
+    log_mean: float = float(np.log(0.3))
+    """Log of the median semi-axis in metres."""
+    log_sigma: float = 0.7
+    """Sigma of the log."""
+
+
+@dataclass(frozen=True, eq=False)
+class Graph:
+    """The problem as arrays for the core, and what its rows are called."""
+
+    core: _core.Graph
+    timestamps: Floats
+    """Seconds, shape (n,)."""
+    object_ids: Ints
+    """Id of each object row, ascending, shape (o,)."""
+    class_names: tuple[str, ...]
+    """One per object: the class most of its boxes have."""
+    observations: Ints
+    """Boxes per object, shape (o,)."""
+
+
+def build_graph(
+    recording: Recording,
+    *,
+    box_noise: BoxNoise | None = None,
+    size_prior: SizePrior | None = None,
+) -> Graph:
+    """Lay out a recording as a least-squares problem that starts from dead reckoning.
+
+    Raises
+    ------
+    ValueError
+        When a box has no object id, a relative position belongs to an object without boxes, or the
+        core refuses the problem.
+    """
+    box_noise = BoxNoise() if box_noise is None else box_noise
+    size_prior = SizePrior() if size_prior is None else size_prior
+    odometry, detections = recording.odometry, recording.detections
+    object_ids, box_object, observations = _objects(detections)
+    steps = np.arange(len(odometry.relative))
+    core = _core.Graph(
+        odometry.pose_model,
+        recording.camera,
+        initial_poses=_core.dead_reckon(
+            odometry.pose_model, odometry.first_pose, odometry.relative
+        ),
+        odometry_from=steps,
+        odometry_to=steps + 1,
+        odometry=odometry.relative,
+        odometry_covariance=_flat(odometry.covariance),
+        box_pose=detections.pose,
+        box_object=box_object,
+        boxes=detections.box,
+        box_covariance=_flat(box_noise.covariance(detections.box)),
+        log_size_mean=np.full(len(object_ids), size_prior.log_mean),
+        log_size_sigma=np.full(len(object_ids), size_prior.log_sigma),
+        **_position_arrays(recording.positions, object_ids),
+    )
+    return Graph(
+        core=core,
+        timestamps=recording.timestamps,
+        object_ids=object_ids,
+        class_names=_class_names(detections, box_object, len(object_ids)),
+        observations=observations,
+    )
+
+
+def solve(
+    graph: Graph, options: _core.SolveOptions | None = None
+) -> tuple[Estimate, _core.Summary]:
+    """Estimate poses and objects; the options default to the core's.
+
+    Objects that the landmark model left as no ellipsoid have NaN in `Estimate.ellipsoids`.
+    """
+    solution = _core.solve(graph.core, _core.SolveOptions() if options is None else options)
+    initial_poses = graph.core.initial_poses
+    dual_quadrics = as_floats("solution.dual_quadrics", solution.dual_quadrics, [None, 9])
+    estimate = Estimate(
+        pose_model=graph.core.pose_model,
+        camera=graph.core.camera,
+        timestamps=graph.timestamps,
+        poses=as_floats("solution.poses", solution.poses, initial_poses.shape),
+        initial_poses=initial_poses,
+        object_ids=graph.object_ids,
+        class_names=graph.class_names,
+        observations=graph.observations,
+        dual_quadrics=dual_quadrics,
+        ellipsoids=np.array([_ellipsoid_or_nan(q) for q in dual_quadrics]).reshape(-1, 9),
+    )
+    return estimate, solution.summary
+
+
+def _objects(detections: Detections) -> tuple[Ints, Ints, Ints]:
+    """Return the object ids (o,), the row of each box's object (b,), and boxes per object (o,)."""
+    unknown = detections.object_id < 0
+    reject_rows("detections.object_id", unknown, "the box belongs to no object yet")
+    object_ids, box_object, observations = np.unique(
+        detections.object_id, return_inverse=True, return_counts=True
+    )
+    return object_ids, box_object.reshape(-1), observations
+
+
+def _class_names(detections: Detections, box_object: Ints, objects: int) -> tuple[str, ...]:
+    classes, box_class = np.unique(detections.class_id, return_inverse=True)
+    votes = np.zeros((objects, len(classes)), dtype=np.int64)
+    np.add.at(votes, (box_object, box_class.reshape(-1)), 1)
+    return tuple(detections.class_names[int(classes[row])] for row in votes.argmax(axis=1))
+
+
+def _position_arrays(
+    positions: RelativePositions | None, object_ids: Ints
+) -> dict[str, Floats | Ints]:
+    if positions is None or not len(positions):
+        return {}
+    has_no_box = ~np.isin(positions.object_id, object_ids)
+    reject_rows("positions.object_id", has_no_box, "the object has no box", positions.object_id)
+    return {
+        "position_pose": positions.pose,
+        "position_object": np.searchsorted(object_ids, positions.object_id),
+        "positions": positions.object_in_robot,
+        "position_covariance": _flat(positions.covariance),
+    }
+
+
+def _flat(covariance: Floats) -> Floats:
+    """Lay out matrices (m, k, k) as rows (m, k * k)."""
+    return covariance.reshape(len(covariance), covariance.shape[1] ** 2)
+
+
+def _ellipsoid_or_nan(dual_quadric: Floats) -> Floats:
+    try:
+        return _core.ellipsoid_from_dual_quadric(dual_quadric)
+    except ValueError:
+        return np.full(9, np.nan)

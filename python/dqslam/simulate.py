@@ -1,0 +1,221 @@
+"""Simulated recordings: from a scenario and a seed to what a robot would have recorded."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.random import Generator, SeedSequence, default_rng
+
+from dqslam import _core
+from dqslam._checks import Bools, Floats
+from dqslam._core import Camera, PoseModel
+from dqslam.recording import Detections, Odometry, Recording, RelativePositions, Truth
+from dqslam.scenario import CameraSettings, PathSettings, Scenario
+
+# Axes of a level camera (x right, y down, z forward) on a mount (x forward, y left, z up).
+_MOUNT_FROM_CAMERA = [0.0, 0.0, 0.0, -0.5, 0.5, -0.5, 0.5]
+_UP = [0.0, 0.0, 1.0]
+_CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+
+
+class _World(NamedTuple):
+    center: Floats  # in the world, m, (o, 3)
+    side: Floats  # of the cubes, m, (o,)
+    semi_axes: Floats  # of the ellipsoids, m, (o, 3)
+    yaw: Floats  # rad, (o,)
+
+
+def simulate(scenario: Scenario, *, seed: int) -> tuple[Recording, Truth]:
+    """Drive through a world of objects and record odometry, boxes and relative positions.
+
+    World, odometry, boxes and positions each have a random stream of their own, and every pair of
+    pose and object its own numbers: changing one setting leaves the others' noise as it was.
+    Objects are in the recording only if they were detected; the truth has all.
+    """
+    if seed < 0:
+        raise ValueError(f"seed: expected zero or more, got {seed}")
+    for_world, for_odometry, for_boxes, for_positions = map(
+        default_rng, SeedSequence(seed).spawn(4)
+    )
+    camera = _camera(scenario.camera)
+    relative, is_turn = _drive(scenario.path)
+    poses = _core.dead_reckon(PoseModel.SE2, np.zeros(3), relative)
+    world = _draw_world(scenario, poses, for_world)
+    truth = _truth(scenario, poses, world)
+
+    box, in_front = _boxes(camera, truth, world)
+    seen = np.argwhere(in_front & _is_detected(box, camera, scenario.detector.min_side_px))
+    pose, object_row = seen[:, 0], seen[:, 1]
+    box_noise = for_boxes.normal(0.0, scenario.detector.edge_sigma_px, size=box.shape)
+    detections = Detections(
+        pose=pose,
+        box=(box + box_noise)[pose, object_row],
+        score=np.ones(len(seen)),
+        class_id=np.zeros(len(seen), dtype=np.int64),
+        object_id=truth.object_id[object_row],
+        class_names={0: truth.class_name[0]},
+    )
+    sigma = scenario.relative_position.sigma_m
+    in_robot = _in_robot(poses, world.center)
+    position_noise = for_positions.normal(0.0, sigma, size=in_robot.shape)
+    recording = Recording(
+        camera=camera,
+        timestamps=scenario.path.period_s * np.arange(len(poses)),
+        odometry=_measure_odometry(scenario, poses[0], relative, is_turn, for_odometry),
+        detections=detections,
+        positions=RelativePositions(
+            pose=pose,
+            object_id=detections.object_id,
+            object_in_robot=(in_robot + position_noise)[pose, object_row],
+            covariance=np.tile(sigma**2 * np.eye(3), (len(seen), 1, 1)),
+        ),
+    )
+    return recording, truth
+
+
+def _camera(settings: CameraSettings) -> Camera:
+    """Make the core's camera; its principal point is the middle of the image."""
+    half_heading = np.deg2rad(settings.heading_deg) / 2.0
+    robot_from_mount = [
+        [*settings.position_in_robot_m, 0.0, 0.0, np.sin(half_heading), np.cos(half_heading)]
+    ]
+    robot_from_camera = _core.compose(PoseModel.SE3, robot_from_mount, [_MOUNT_FROM_CAMERA])[0]
+    focal_px = 1000.0 * settings.focal_length_mm / settings.pixel_size_um
+    return Camera(
+        focal_px,
+        focal_px,
+        (settings.width_px - 1) / 2.0,
+        (settings.height_px - 1) / 2.0,
+        settings.width_px,
+        settings.height_px,
+        robot_from_camera=robot_from_camera,
+    )
+
+
+def _drive(path: PathSettings) -> tuple[Floats, Bools]:
+    """Return the true motions (v, 0, omega), shape (n - 1, 3), and which steps turn.
+
+    The robot drives v forward, then turns by omega. Straight parts have the whole number of steps
+    that brings the rectangle nearest to its size.
+    """
+    turn = np.full(path.turn_steps, np.pi / 2.0 / path.turn_steps)
+    heading = np.cumsum(turn) - turn
+    along_sides = path.step_m * (np.cos(heading).sum() + np.sin(heading).sum())
+    straight = [round((side - along_sides) / path.step_m) for side in (path.length_m, path.width_m)]
+    if min(straight) < 0:
+        raise ValueError("path: the rectangle is too small for its turns")
+    half_lap = np.concatenate([np.zeros(straight[0]), turn, np.zeros(straight[1]), turn])
+    from_corner = np.tile(half_lap, 2 * path.laps)
+    omega = np.roll(from_corner, -round(path.start_fraction * straight[0]))
+    relative = np.column_stack([np.full(len(omega), path.step_m), np.zeros(len(omega)), omega])
+    return relative, omega != 0.0
+
+
+def _draw_world(scenario: Scenario, poses: Floats, random: Generator) -> _World:
+    """Place objects uniformly inside the path; every kind of object uses the same numbers."""
+    world = scenario.world
+    low = poses[:, :2].min(axis=0) + world.margin_m
+    high = poses[:, :2].max(axis=0) - world.margin_m
+    if (low > high).any():
+        raise ValueError(f"world.margin_m: {world.margin_m} m leaves no room inside the path")
+    count = world.object_count
+    ground = random.uniform(low, high, size=(count, 2))
+    height = random.normal(0.0, world.height_sigma_m, size=(count, 1))
+    side = random.normal(world.side_mean_m, world.side_sigma_m, size=count)
+    side = np.maximum(world.side_min_m, side)
+    yaw = random.uniform(-np.pi, np.pi, size=count)
+    factor = random.uniform(*world.semi_axis_factor, size=(count, 3))
+    return _World(np.hstack([ground, height]), side, factor * side[:, None] / 2.0, yaw)
+
+
+def _truth(scenario: Scenario, poses: Floats, world: _World) -> Truth:
+    count = len(world.center)
+    if scenario.objects == "cubes":
+        ellipsoids, volume = None, world.side**3
+    else:
+        upright = np.column_stack(
+            [np.zeros((count, 2)), np.sin(world.yaw / 2.0), np.cos(world.yaw / 2.0)]
+        )
+        rows = zip(world.center, world.semi_axes, upright, strict=True)
+        ellipsoids = np.array([_core.ellipsoid_from_axes(*row) for row in rows])
+        volume = 4.0 / 3.0 * np.pi * world.semi_axes.prod(axis=1)
+    return Truth(
+        pose_model=PoseModel.SE2,
+        poses=poses,
+        object_id=np.arange(count),
+        center=world.center,
+        volume=volume,
+        class_name=(scenario.objects.removesuffix("s"),) * count,
+        ellipsoids=ellipsoids,
+    )
+
+
+def _boxes(camera: Camera, truth: Truth, world: _World) -> tuple[Floats, Bools]:
+    """Return the exact boxes of all objects from all poses, (n, o, 4), and which are in front."""
+    if truth.ellipsoids is None:
+        return _cube_boxes(camera, truth.poses, world)
+    poses, objects = len(truth.poses), len(truth.center)
+    box, in_front = _core.project_to_boxes(
+        PoseModel.SE2,
+        camera,
+        np.repeat(truth.poses, objects, axis=0),
+        np.tile(truth.ellipsoids, (poses, 1)),
+    )
+    return box.reshape(poses, objects, 4), in_front.reshape(poses, objects)
+
+
+def _cube_boxes(camera: Camera, poses: Floats, world: _World) -> tuple[Floats, Bools]:
+    """Bound the projected corners of cubes."""
+    from scipy.spatial.transform import Rotation
+
+    turned = Rotation.from_rotvec(np.outer(world.yaw, _UP)).as_matrix() @ _CORNERS.T  # (o, 3, 8)
+    corners = world.center[:, :, None] + world.side[:, None, None] * turned
+    world_from_camera = _core.world_from_camera(PoseModel.SE2, camera, poses)
+    rotation = Rotation.from_quat(world_from_camera[:, 3:]).as_matrix()
+    from_camera = corners[None] - world_from_camera[:, None, :3, None]  # (n, o, 3, 8)
+    x, y, z = np.moveaxis(np.einsum("nji,nojc->noic", rotation, from_camera), 2, 0)
+    in_front = (z > 0.0).all(axis=2)
+    z = np.where(in_front[:, :, None], z, np.nan)
+    u, v = camera.fx * x / z + camera.cx, camera.fy * y / z + camera.cy
+    return np.stack([u.min(2), v.min(2), u.max(2), v.max(2)], axis=2), in_front
+
+
+def _is_detected(box: Floats, camera: Camera, min_side_px: float) -> Bools:
+    """Say which boxes are large enough and wholly inside the image; NaN is neither."""
+    u_min, v_min, u_max, v_max = np.moveaxis(box, 2, 0)
+    large = np.maximum(u_max - u_min, v_max - v_min) > min_side_px
+    inside = (u_min >= -0.5) & (v_min >= -0.5)
+    inside &= (u_max <= camera.width - 0.5) & (v_max <= camera.height - 0.5)
+    return np.asarray(large & inside)
+
+
+def _measure_odometry(
+    scenario: Scenario, first_pose: Floats, relative: Floats, is_turn: Bools, random: Generator
+) -> Odometry:
+    """Add noise to (v, omega) and say how large it is."""
+    from scipy.spatial.transform import Rotation
+
+    noise = scenario.odometry
+    sigma = np.column_stack(
+        [
+            np.full(len(relative), noise.translation_sigma_m),
+            np.full(len(relative), noise.lateral_sigma_m),
+            np.where(is_turn, noise.turn_rotation_sigma_rad, noise.rotation_sigma_rad),
+        ]
+    )
+    error = sigma * random.normal(size=sigma.shape) * [1.0, 0.0, 1.0]  # nothing sideways
+    measured = relative + error
+    # The error is along the axes of the previous pose; the covariance belongs to those of the next.
+    next_from_previous = Rotation.from_rotvec(np.outer(-measured[:, 2], _UP)).as_matrix()
+    covariance = np.einsum("nij,nj,nkj->nik", next_from_previous, sigma**2, next_from_previous)
+    return Odometry(PoseModel.SE2, first_pose, measured, covariance)
+
+
+def _in_robot(poses: Floats, center: Floats) -> Floats:
+    """Return the objects' centres in the frames of all robots, metres, shape (n, o, 3)."""
+    poses_count, objects = len(poses), len(center)
+    on_ground = np.column_stack([center[:, :2], np.zeros(objects)])
+    in_robot = _core.between(
+        PoseModel.SE2, np.repeat(poses, objects, axis=0), np.tile(on_ground, (poses_count, 1))
+    )
+    in_robot[:, 2] = np.tile(center[:, 2], poses_count)  # the robot's z axis is the world's
+    return in_robot.reshape(poses_count, objects, 3)
