@@ -130,6 +130,14 @@ void Validate(const Graph& graph, bool poses_known) {
   CheckCovariance<3>("position_covariance", positions.covariance);
 }
 
+void Append(const Summary& stage, Summary* total) {
+  const Summary before = *total;
+  *total = stage;
+  total->iterations += before.iterations;
+  total->rejected_steps += before.rejected_steps;
+  if (!before.message.empty()) total->initial_cost = before.initial_cost;
+}
+
 std::string ToString(const Summary& summary) {
   std::ostringstream text;
   text << std::setprecision(6) << (summary.converged ? "converged" : "did not converge")

@@ -80,7 +80,10 @@ struct Summary {
   std::string message;             ///< how it ended, in words
 };
 
-/// A few lines for people.
+/// Makes `total` the summary of all stages so far: counts add up, the rest is the last stage's.
+void Append(const Summary& stage, Summary* total);
+
+/// One line for people.
 std::string ToString(const Summary& summary);
 
 }  // namespace dqslam

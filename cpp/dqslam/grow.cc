@@ -76,9 +76,7 @@ Summary Grow(const PreparedGraph& prepared, const SolveOptions& options, const M
                                                                    : options.residual;
     stage.minimizer = Minimizer::kLevenbergMarquardt;
     stage.max_iterations = options.grow_iterations;
-    const Summary summary = Optimize(prepared, options, stage, monitor, state);
-    total.iterations += summary.iterations;
-    total.rejected_steps += summary.rejected_steps;
+    Append(Optimize(prepared, options, stage, monitor, state), &total);
   }
   return total;
 }

@@ -2,9 +2,9 @@
 
 #include <chrono>
 #include <cmath>
-#include <numeric>
 
 #include "dqslam/grow.h"
+#include "dqslam/recover.h"
 
 namespace dqslam {
 namespace {
@@ -33,16 +33,6 @@ void ValidateStart(const Graph& graph, const State& start) {
   }
 }
 
-void Append(const Summary& stage, Summary* total) {
-  const int iterations = total->iterations + stage.iterations;
-  const int rejected = total->rejected_steps + stage.rejected_steps;
-  const double initial_cost = total->message.empty() ? stage.initial_cost : total->initial_cost;
-  *total = stage;
-  total->initial_cost = initial_cost;
-  total->iterations = iterations;
-  total->rejected_steps = rejected;
-}
-
 class Solver {
  public:
   Solver(const Graph& graph, const SolveOptions& options, const Monitor& monitor)
@@ -64,6 +54,7 @@ class Solver {
   }
 
   Summary Run(const std::optional<State>& start, State* state) {
+    const bool refine = options_.residual == Residual::kTangentThenBox;
     Summary summary;
     if (start) {
       *state = *start;
@@ -74,14 +65,12 @@ class Solver {
         summary = Grow(prepared_, options_, monitor_, state);
       } else {
         StartAll(state);
-      }
-      if (options_.residual == Residual::kTangentThenBox) {
-        Append(Batch(Residual::kTangent, state), &summary);
+        if (refine) Append(Batch(Residual::kTangent, state), &summary);
       }
     }
-    const Residual last = options_.residual == Residual::kTangentThenBox ? Residual::kBox
-                                                                         : options_.residual;
-    Append(Batch(last, state), &summary);
+    const Stage last = BatchStage(prepared_, options_);
+    Append(Batch(last.residual, state), &summary);
+    if (refine) RestartStuckObjects(prepared_, options_, monitor_, state, &summary);
     return summary;
   }
 
@@ -94,14 +83,8 @@ class Solver {
   }
 
   Summary Batch(Residual residual, State* state) {
-    Stage stage;
-    stage.first_free_pose = options_.mode == Mode::kMapping ? graph_.num_poses() : 1;
-    stage.end_pose = graph_.num_poses();
-    stage.boxes.resize(graph_.boxes.size());
-    std::iota(stage.boxes.begin(), stage.boxes.end(), 0);
+    Stage stage = BatchStage(prepared_, options_);
     stage.residual = residual;
-    stage.minimizer = options_.minimizer;
-    stage.max_iterations = options_.max_iterations;
     return Optimize(prepared_, options_, stage, monitor_, state);
   }
 

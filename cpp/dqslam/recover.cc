@@ -1,0 +1,75 @@
+#include "dqslam/recover.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include "dqslam/grow.h"
+
+namespace dqslam {
+namespace {
+
+constexpr double kImpossibleBox = 13.28;  // chi-square of 4 degrees of freedom, 99 %
+constexpr int kMaxRestarts = 4;
+
+std::vector<bool> StuckObjects(const PreparedGraph& prepared, const SolveOptions& options,
+                               const State& state) {
+  const Eigen::VectorXd costs = BoxCosts(prepared, options, state);
+  std::vector<bool> stuck;
+  for (const std::vector<int>& rows : prepared.boxes_of_object) {
+    std::vector<double> chi_squares;
+    for (const int row : rows) chi_squares.push_back(2 * costs[row]);
+    const auto middle = chi_squares.begin() + chi_squares.size() / 2;
+    std::nth_element(chi_squares.begin(), middle, chi_squares.end());
+    stuck.push_back(*middle > kImpossibleBox);
+  }
+  return stuck;
+}
+
+}  // namespace
+
+Stage BatchStage(const PreparedGraph& prepared, const SolveOptions& options) {
+  Stage stage;
+  stage.first_free_pose = options.mode == Mode::kMapping ? prepared.graph.num_poses() : 1;
+  stage.end_pose = prepared.graph.num_poses();
+  stage.boxes.resize(prepared.graph.boxes.size());
+  std::iota(stage.boxes.begin(), stage.boxes.end(), 0);
+  stage.residual =
+      options.residual == Residual::kTangentThenBox ? Residual::kBox : options.residual;
+  stage.minimizer = options.minimizer;
+  stage.max_iterations = options.max_iterations;
+  return stage;
+}
+
+void RestartStuckObjects(const PreparedGraph& prepared, const SolveOptions& options,
+                         const Monitor& monitor, State* state, Summary* summary) {
+  const Stage all = BatchStage(prepared, options);
+  for (int restart = 0; restart < kMaxRestarts; ++restart) {
+    const std::vector<bool> stuck = StuckObjects(prepared, options, *state);
+    if (std::none_of(stuck.begin(), stuck.end(), [](bool is_stuck) { return is_stuck; })) return;
+
+    State attempt = *state;
+    Stage rest = all;
+    rest.boxes.clear();
+    for (const int row : all.boxes) {
+      if (!stuck[prepared.graph.boxes.object[row]]) rest.boxes.push_back(row);
+    }
+    Summary total = *summary;
+    Append(Optimize(prepared, options, rest, monitor, &attempt), &total);
+    for (int object = 0; object < prepared.graph.num_objects(); ++object) {
+      if (!stuck[object]) continue;
+      attempt.landmarks.row(object) =
+          StartObject(prepared, options, attempt, object, prepared.boxes_of_object[object]);
+    }
+    Stage towards = all;
+    towards.residual = Residual::kTangent;
+    towards.minimizer = Minimizer::kLevenbergMarquardt;
+    Append(Optimize(prepared, options, towards, monitor, &attempt), &total);
+    Append(Optimize(prepared, options, all, monitor, &attempt), &total);
+    const bool better = total.final_cost < summary->final_cost * (1 - 1e-9);
+    *summary = better ? total : *summary;
+    if (!better) return;
+    *state = attempt;
+  }
+}
+
+}  // namespace dqslam

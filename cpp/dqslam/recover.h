@@ -1,0 +1,17 @@
+// Objects that are stuck in an impossible place, found by their boxes and started again.
+#pragma once
+
+#include "dqslam/optimize.h"
+
+namespace dqslam {
+
+/// The last stage: all poses and all boxes, with the last residual of the options.
+Stage BatchStage(const PreparedGraph& prepared, const SolveOptions& options);
+
+/// Leaves out the objects whose typical box is impossible by the noise model, minimises the rest,
+/// starts those objects again from all their views, and minimises all; as long as that lowers the
+/// cost.  `summary` is that of the last stage so far and is updated.
+void RestartStuckObjects(const PreparedGraph& prepared, const SolveOptions& options,
+                         const Monitor& monitor, State* state, Summary* summary);
+
+}  // namespace dqslam
