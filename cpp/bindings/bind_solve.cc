@@ -127,7 +127,8 @@ void BindSolve(py::module_& m) {
   BindEnums(m);
   BindOptions(m);
   BindSolution(m);
-  m.def("solve", &SolveFromPython, "graph"_a, "options"_a = SolveOptions(),
+  m.def("solve", &SolveFromPython, "graph"_a,
+        py::arg_v("options", SolveOptions(), "SolveOptions()"),
         "start"_a = std::nullopt,
         "Solve a graph, from its odometry or from a given start. Releases the GIL; Ctrl-C raises "
         "KeyboardInterrupt; ValueError for bad input.");
