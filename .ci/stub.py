@@ -19,14 +19,15 @@ def generate(directory: Path) -> Path:
     return directory / "dqslam" / "_core.pyi"
 
 
-def write_enum_members(text: str) -> str:
-    """Turn `SE2: ClassVar[PoseModel]` into `SE2 = 0`: for a type checker only that is a member."""
+def for_type_checkers(text: str) -> str:
+    """Turn `SE2: ClassVar[PoseModel]` into the member `SE2 = 0`; annotate keyword arguments."""
     for name, value in vars(_core).items():
         if not (isinstance(value, type) and issubclass(value, enum.Enum)):
             continue
         for member in value:
             declaration = rf"\b{member.name}: typing\.ClassVar\[{name}\].*"
             text = re.sub(declaration, f"{member.name} = {member.value!r}", text)
+    text = text.replace("**kwargs)", "**kwargs: typing.Any)")
     return re.sub(r" +@classmethod\n +def __new__\(cls, value\):\s+\.\.\.\n", "", text)
 
 
@@ -43,7 +44,7 @@ def write_stub(output: Path) -> None:
     """Generate the stub at `output`."""
     with tempfile.TemporaryDirectory() as directory:
         stub = generate(Path(directory))
-        stub.write_text(write_enum_members(stub.read_text()))
+        stub.write_text(for_type_checkers(stub.read_text()))
         tidy(stub)
         shutil.copyfile(stub, output)
 

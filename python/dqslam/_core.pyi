@@ -1,0 +1,555 @@
+"""
+Geometry, costs and solvers of dqslam, in C++.
+"""
+
+from __future__ import annotations
+
+import enum
+import typing
+
+import numpy
+import numpy.typing
+
+__all__: list[str] = [
+    "Camera",
+    "Graph",
+    "LandmarkModel",
+    "Loss",
+    "Minimizer",
+    "Mode",
+    "PoseModel",
+    "Residual",
+    "Schedule",
+    "Solution",
+    "SolveOptions",
+    "Start",
+    "State",
+    "Summary",
+    "axes_from_ellipsoid",
+    "between",
+    "compose",
+    "dead_reckon",
+    "dual_quadric_from_ellipsoid",
+    "dual_quadric_matrix",
+    "ellipsoid_from_axes",
+    "ellipsoid_from_dual_quadric",
+    "minus",
+    "plus",
+    "project_to_boxes",
+    "solve",
+    "world_from_camera",
+]
+
+class PoseModel(enum.Enum):
+    """
+    How a pose is stored.
+    """
+
+    SE2 = 0
+    SE3 = 1
+
+class Camera:
+    """
+    Pinhole camera, rigidly mounted on the robot. Immutable.
+    """
+    def __init__(
+        self,
+        fx: typing.SupportsFloat | typing.SupportsIndex,
+        fy: typing.SupportsFloat | typing.SupportsIndex,
+        cx: typing.SupportsFloat | typing.SupportsIndex,
+        cy: typing.SupportsFloat | typing.SupportsIndex,
+        width: typing.SupportsInt | typing.SupportsIndex,
+        height: typing.SupportsInt | typing.SupportsIndex,
+        *,
+        distortion: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[5, 1]"] = ...,
+        robot_from_camera: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[7, 1]"] = ...,
+    ) -> None:
+        """
+        Focal lengths, principal point and size in pixels; k1 k2 p1 p2 k3; the SE(3) mount.
+        """
+    def distort_points(
+        self, undistorted: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"]
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Distorted pixels of ideal pinhole pixels, shape (n, 2).
+        """
+    def undistort_boxes(
+        self, distorted: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"]
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Boxes, shape (n, 4), each edge undistorted at its middle.
+        """
+    def undistort_points(
+        self, distorted: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"]
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Ideal pinhole pixels of distorted pixels, shape (n, 2).
+        """
+    @property
+    def cx(self) -> float:
+        """
+        Principal point, pixels.
+        """
+    @property
+    def cy(self) -> float:
+        """
+        Principal point, pixels.
+        """
+    @property
+    def distortion(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[5, 1]"]:
+        """
+        k1 k2 p1 p2 k3, shape (5,).
+        """
+    @property
+    def fx(self) -> float:
+        """
+        Focal length, pixels.
+        """
+    @property
+    def fy(self) -> float:
+        """
+        Focal length, pixels.
+        """
+    @property
+    def has_distortion(self) -> bool: ...
+    @property
+    def height(self) -> int:
+        """
+        Pixels.
+        """
+    @property
+    def robot_from_camera(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[7, 1]"]:
+        """
+        SE(3) pose, shape (7,).
+        """
+    @property
+    def width(self) -> int:
+        """
+        Pixels.
+        """
+
+class Graph:
+    """
+    The problem as plain tables; ids are row numbers. Immutable.
+    """
+    def __init__(
+        self,
+        pose_model: PoseModel,
+        camera: Camera,
+        *,
+        initial_poses: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+        odometry_from: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
+        odometry_to: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
+        odometry: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+        odometry_covariance: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+        box_pose: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
+        box_object: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
+        boxes: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+        box_covariance: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+        position_pose: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"] = ...,
+        position_object: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"] = ...,
+        positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"] = ...,
+        position_covariance: typing.Annotated[
+            numpy.typing.ArrayLike, numpy.float64, "[m, n]"
+        ] = ...,
+        log_size_mean: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        log_size_sigma: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    ) -> None:
+        """
+        Shapes, with d the size of a pose and k of its tangent: initial_poses (n, d); odometry (m, d), to_in_from, with covariance (m, k * k); boxes (b, 4) undistorted pixels with covariance (b, 16); positions (p, 3) object_in_robot, metres, with covariance (p, 9); log_size_mean and log_size_sigma (o,), of semi-axes in log metres.
+        """
+    @property
+    def box_covariance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]: ...
+    @property
+    def box_object(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]: ...
+    @property
+    def box_pose(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]: ...
+    @property
+    def boxes(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]: ...
+    @property
+    def camera(self) -> Camera: ...
+    @property
+    def initial_poses(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Shape (n, d).
+        """
+    @property
+    def log_size_mean(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    @property
+    def log_size_sigma(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    @property
+    def num_objects(self) -> int: ...
+    @property
+    def num_poses(self) -> int: ...
+    @property
+    def odometry(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]: ...
+    @property
+    def odometry_covariance(
+        self,
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]: ...
+    @property
+    def odometry_from(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]: ...
+    @property
+    def odometry_to(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]: ...
+    @property
+    def pose_model(self) -> PoseModel: ...
+    @property
+    def position_covariance(
+        self,
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]: ...
+    @property
+    def position_object(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]: ...
+    @property
+    def position_pose(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]: ...
+    @property
+    def positions(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]: ...
+
+class Mode(enum.Enum):
+    """
+    What is unknown.
+    """
+
+    MAPPING = 1
+    SLAM = 0
+
+class Residual(enum.Enum):
+    """
+    How a box constrains an object.
+    """
+
+    ALGEBRAIC = 0
+    ALGEBRAIC_NORMALIZED = 1
+    BOX = 3
+    TANGENT = 2
+    TANGENT_THEN_BOX = 4
+
+class LandmarkModel(enum.Enum):
+    """
+    The parameters of an object.
+    """
+
+    DUAL_QUADRIC = 0
+    ELLIPSOID = 1
+
+class Start(enum.Enum):
+    """
+    Where an object starts.
+    """
+
+    IDENTITY = 0
+    SIZE_PRIOR = 2
+    SPHERE = 3
+    SVD = 1
+
+class Schedule(enum.Enum):
+    """
+    In which order poses are added.
+    """
+
+    BATCH = 0
+    GROW = 1
+
+class Loss(enum.Enum):
+    """
+    Robust loss on whole boxes.
+    """
+
+    CAUCHY = 2
+    HUBER = 1
+    NONE = 0
+
+class Minimizer(enum.Enum):
+    """
+    The minimiser of the last stage.
+    """
+
+    DOGLEG = 1
+    LEVENBERG_MARQUARDT = 0
+
+class SolveOptions:
+    """
+    What a caller may choose.
+    """
+
+    landmark_model: LandmarkModel
+    loss: Loss
+    mode: Mode
+    residual: Residual
+    schedule: Schedule
+    start: Start
+    def __init__(self, **kwargs: typing.Any) -> None:
+        """
+        Any of the attributes as keywords.
+        """
+    @property
+    def algebraic_sigma(self) -> float:
+        """
+        Of both algebraic residuals, in their own unit.
+        """
+    @algebraic_sigma.setter
+    def algebraic_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def function_tolerance(self) -> float:
+        """
+        Stop when |change of cost| / cost falls below.
+        """
+    @function_tolerance.setter
+    def function_tolerance(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def grow_iterations(self) -> int:
+        """
+        Levenberg-Marquardt steps after each addition.
+        """
+    @grow_iterations.setter
+    def grow_iterations(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    @property
+    def grow_min_views(self) -> int:
+        """
+        Boxes an object needs before it is started.
+        """
+    @grow_min_views.setter
+    def grow_min_views(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    @property
+    def grow_poses(self) -> int:
+        """
+        Poses added at a time.
+        """
+    @grow_poses.setter
+    def grow_poses(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    @property
+    def loss_scale(self) -> float:
+        """
+        Sigmas of a whole box.
+        """
+    @loss_scale.setter
+    def loss_scale(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def max_iterations(self) -> int:
+        """
+        Of each batch stage.
+        """
+    @max_iterations.setter
+    def max_iterations(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    @property
+    def minimizer(self) -> Minimizer:
+        """
+        Of the last stage.
+        """
+    @minimizer.setter
+    def minimizer(self, arg0: Minimizer) -> None: ...
+
+class State:
+    """
+    Poses and landmark parameters: where a solve starts.
+    """
+    def __init__(
+        self,
+        poses: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+        landmarks: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    ) -> None:
+        """
+        Poses (n, d) and landmark parameters (o, 9).
+        """
+    @property
+    def landmarks(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Shape (o, 9).
+        """
+    @property
+    def poses(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Shape (n, d).
+        """
+
+class Summary:
+    """
+    How a solve went.
+    """
+    def __str__(self) -> str: ...
+    @property
+    def converged(self) -> bool:
+        """
+        The last stage met a stopping test and accepted a step.
+        """
+    @property
+    def final_cost(self) -> float:
+        """
+        Likewise.
+        """
+    @property
+    def gradient_norm_end(self) -> float:
+        """
+        Likewise at its end.
+        """
+    @property
+    def gradient_norm_start(self) -> float:
+        """
+        Infinity norm at the start of the last stage.
+        """
+    @property
+    def initial_cost(self) -> float:
+        """
+        Half the sum of squared residuals, in sigmas, after the loss.
+        """
+    @property
+    def iterations(self) -> int:
+        """
+        Of all stages.
+        """
+    @property
+    def message(self) -> str:
+        """
+        How it ended, in words.
+        """
+    @property
+    def rejected_steps(self) -> int:
+        """
+        Of all stages.
+        """
+    @property
+    def seconds(self) -> float:
+        """
+        Wall clock, all stages.
+        """
+
+class Solution:
+    """
+    The answer of solve.
+    """
+    @property
+    def dual_quadrics(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        q1 .. q9, shape (o, 9).
+        """
+    @property
+    def landmarks(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Parameters of the model, shape (o, 9).
+        """
+    @property
+    def poses(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Shape (n, d).
+        """
+    @property
+    def summary(self) -> Summary: ...
+    @property
+    def svd_singular_values(
+        self,
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Of each object's SVD start, shape (o, 10), descending; NaN where not used.
+        """
+
+def axes_from_ellipsoid(
+    ellipsoid: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[9, 1]"],
+) -> tuple[
+    typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"],
+    typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"],
+    typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 1]"],
+]:
+    """
+    Centre (3,), semi-axes (3,) descending [m], orientation x y z w (4,).
+    """
+
+def between(
+    model: PoseModel,
+    a_from_b: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    a_from_c: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+    """
+    Relative poses row by row: b_from_c, shape (n, d).
+    """
+
+def compose(
+    model: PoseModel,
+    a_from_b: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    b_from_c: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+    """
+    Compose poses row by row: a_from_c, shape (n, d).
+    """
+
+def dead_reckon(
+    model: PoseModel,
+    first: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    relative: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+    """
+    Chain relative poses (n, d) behind the first (d,): shape (n + 1, d).
+    """
+
+def dual_quadric_from_ellipsoid(
+    ellipsoid: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[9, 1]"],
+) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[9, 1]"]:
+    """
+    q1 .. q9 of [S&M17] eq. (2) from log-Cholesky parameters, shape (9,).
+    """
+
+def dual_quadric_matrix(
+    quadric: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[9, 1]"],
+) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
+    """
+    The 4 x 4 matrix Q* of q1 .. q9, with Q*(4,4) = 1.
+    """
+
+def ellipsoid_from_axes(
+    center: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
+    semi_axes: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
+    orientation_xyzw: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 1]"],
+) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[9, 1]"]:
+    """
+    Log-Cholesky parameters (9,) of a centre, semi-axes [m] and world_from_object rotation.
+    """
+
+def ellipsoid_from_dual_quadric(
+    quadric: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[9, 1]"],
+) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[9, 1]"]:
+    """
+    Log-Cholesky parameters (9,) of q1 .. q9; ValueError when q is no ellipsoid.
+    """
+
+def minus(
+    model: PoseModel,
+    poses: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    origins: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+    """
+    Tangents (n, k) that move the origins to the poses.
+    """
+
+def plus(
+    model: PoseModel,
+    poses: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    tangents: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+    """
+    Move poses (n, d) by tangents (n, k), in the frames of the poses.
+    """
+
+def project_to_boxes(
+    model: PoseModel,
+    camera: Camera,
+    poses: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    ellipsoids: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+) -> tuple[
+    typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"],
+    typing.Annotated[numpy.typing.NDArray[numpy.bool], "[m, 1]"],
+]:
+    """
+    Boxes (n, 4) of ellipsoid i from pose i [undistorted px], and whether it is strictly in front (n,); NaN where it is not.
+    """
+
+def solve(graph: Graph, options: SolveOptions = ..., start: State | None = None) -> Solution:
+    """
+    Solve a graph, from its odometry or from a given start. Releases the GIL; Ctrl-C raises KeyboardInterrupt; ValueError for bad input.
+    """
+
+def world_from_camera(
+    model: PoseModel,
+    camera: Camera,
+    poses: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+    """
+    SE(3) poses of the camera, shape (n, 7).
+    """
