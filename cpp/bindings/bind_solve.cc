@@ -88,6 +88,8 @@ void BindOptions(py::module_& m) {
       .def_readwrite("grow_poses", &SolveOptions::grow_poses, "Poses added at a time.")
       .def_readwrite("grow_iterations", &SolveOptions::grow_iterations,
                      "Levenberg-Marquardt steps after each addition.")
+      .def_readwrite("grow_tolerance", &SolveOptions::grow_tolerance,
+                     "Function tolerance of these steps.")
       .def_readwrite("grow_min_views", &SolveOptions::grow_min_views,
                      "Boxes an object needs before it is started.");
 }

@@ -76,6 +76,7 @@ Summary Grow(const PreparedGraph& prepared, const SolveOptions& options, const M
                                                                    : options.residual;
     stage.minimizer = Minimizer::kLevenbergMarquardt;
     stage.max_iterations = options.grow_iterations;
+    stage.function_tolerance = options.grow_tolerance;
     Append(Optimize(prepared, options, stage, monitor, state), &total);
   }
   return total;

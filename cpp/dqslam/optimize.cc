@@ -42,14 +42,14 @@ class MonitorCallback : public ceres::IterationCallback {
   const Monitor& monitor_;
 };
 
-ceres::Solver::Options CeresOptions(const SolveOptions& options, const Stage& stage) {
+ceres::Solver::Options CeresOptions(const Stage& stage) {
   ceres::Solver::Options ceres_options;
   ceres_options.trust_region_strategy_type = stage.minimizer == Minimizer::kDogleg
                                                  ? ceres::DOGLEG
                                                  : ceres::LEVENBERG_MARQUARDT;
   ceres_options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
   ceres_options.max_num_iterations = stage.max_iterations;
-  ceres_options.function_tolerance = options.function_tolerance;
+  ceres_options.function_tolerance = stage.function_tolerance;
   ceres_options.gradient_tolerance = 1e-12;
   ceres_options.parameter_tolerance = 1e-12;
   // An invalid step is a step into impossible geometry: shrink and go on.
@@ -73,7 +73,7 @@ Summary Optimize(const PreparedGraph& prepared, const SolveOptions& options, con
   const SingleOpenMpThread single_thread;
   ceres::Problem problem;
   Assemble(prepared, options, stage, state, &problem);
-  ceres::Solver::Options ceres_options = CeresOptions(options, stage);
+  ceres::Solver::Options ceres_options = CeresOptions(stage);
   MonitorCallback callback(monitor);
   ceres_options.callbacks.push_back(&callback);
 

@@ -26,6 +26,7 @@ struct Stage {
   Residual residual = Residual::kTangent;  ///< not kTangentThenBox
   Minimizer minimizer = Minimizer::kDogleg;
   int max_iterations = 100;
+  double function_tolerance = 1e-10;  ///< stop when |change of cost| / cost falls below
 };
 
 /// Minimises from `state` and writes the result there.  Where the box residual is undefined at the

@@ -37,6 +37,7 @@ Stage BatchStage(const PreparedGraph& prepared, const SolveOptions& options) {
       options.residual == Residual::kTangentThenBox ? Residual::kBox : options.residual;
   stage.minimizer = options.minimizer;
   stage.max_iterations = options.max_iterations;
+  stage.function_tolerance = options.function_tolerance;
   return stage;
 }
 
