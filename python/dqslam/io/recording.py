@@ -86,6 +86,8 @@ def load_recording(
     """
     if not 0 <= min_score <= 1:
         raise ValueError(f"min_score is {min_score:g}, not between 0 and 1")
+    if max_time_difference is not None and not max_time_difference >= 0:
+        raise ValueError(f"max_time_difference is {max_time_difference:g}, negative")
     lens = read_camera(camera)
     times, path = read_trajectory(odometry)
     if len(times) < 2:

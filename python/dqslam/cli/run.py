@@ -1,0 +1,183 @@
+"""``dqslam run``: a map and a trajectory from the files of a recording."""
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from dqslam.io import OdometryNoise
+
+NOISE = "translation=0.02,rotation=0.01"
+
+
+def run(
+    camera: Annotated[Path, typer.Option(help="JSON or TOML: fx fy cx cy width height k1 ...")],
+    odometry: Annotated[Path, typer.Option(help="TUM trajectory, world_from_camera.")],
+    detections: Annotated[Path, typer.Option(help="CSV: frame,timestamp,x1,y1,x2,y2,...")],
+    out: Annotated[Path, typer.Option(help="Directory of the results.")],
+    min_score: Annotated[float, typer.Option(help="Leave out boxes with a lower score.")] = 0.5,
+    ids: Annotated[
+        Literal["track_id", "class_id"], typer.Option(help="The column that tells objects apart.")
+    ] = "track_id",
+    mode: Annotated[
+        Literal["slam", "mapping"], typer.Option(help="mapping: the odometry is the truth.")
+    ] = "slam",
+    perturb_odometry: Annotated[
+        str | None,
+        typer.Option(metavar="NOISE", help=f'Add noise to every step [m, rad]: "{NOISE}".'),
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of that noise.")] = 0,
+    odometry_noise: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NOISE",
+            help="What to believe of every step, likewise. Default: the noise that was added, "
+            'else "translation=0.01,rotation=0.005".',
+        ),
+    ] = None,
+    groundtruth: Annotated[
+        Path | None, typer.Option(help="TUM trajectory to compare with, in any world frame.")
+    ] = None,
+    max_time_difference: Annotated[
+        float | None,
+        typer.Option(help="Seconds from a box to its pose. Default: half the interval of poses."),
+    ] = None,
+) -> None:
+    """Estimate the trajectory and the objects of a recording.
+
+    Writes trajectory.txt, odometry.txt (what it started from), map.json and report.json.
+    """
+    from dqslam import _core, io, run_recording
+
+    added = parse_noise("--perturb-odometry", perturb_odometry)
+    believed = parse_noise("--odometry-noise", odometry_noise) or added or io.OdometryNoise()
+    reference, reference_name = None, None
+    if groundtruth is not None:
+        reference, reference_name = io.read_trajectory(groundtruth, repeated_times=True), "file"
+    elif added is not None:
+        reference, reference_name = io.read_trajectory(odometry), "odometry before the added noise"
+    recording, dropped = io.load_recording(
+        camera,
+        odometry,
+        detections,
+        min_score=min_score,
+        ids=ids,
+        max_time_difference=max_time_difference,
+        odometry_noise=believed,
+    )
+    if added is not None:
+        recording = run_recording.perturb_odometry(recording, added, seed=seed, believed=believed)
+    out.mkdir(parents=True, exist_ok=True)
+    result = run_recording.run(recording, mode=_core.Mode[mode.upper()], reference=reference)
+    report = {
+        "camera": str(camera),
+        "odometry": str(odometry),
+        "detections": str(detections),
+        "groundtruth": None if groundtruth is None else str(groundtruth),
+        "min_score": min_score,
+        "ids": ids,
+        "odometry_noise_added": None if added is None else asdict(added) | {"seed": seed},
+        "odometry_noise_believed": asdict(believed),
+        "dropped_boxes": asdict(dropped),
+        "reference": reference_name,
+        **result.report,
+    }
+    io.save_estimate(result.estimate, out)
+    io.write_json(out / "report.json", report)
+    _show(report, out)
+
+
+def parse_noise(option: str, text: str | None) -> "OdometryNoise | None":
+    """Read "translation=0.02,rotation=0.01", both needed, None of None."""
+    from dqslam.io import OdometryNoise
+
+    if text is None:
+        return None
+    try:
+        pairs = [part.split("=") for part in text.split(",")]
+        values = {name.strip(): float(value) for name, value in pairs}
+    except ValueError:
+        values = {}
+    if len(values) != 2 or set(values) != {"translation", "rotation"}:
+        raise ValueError(f'{option}: {text!r} is not like "{NOISE}"')
+    try:
+        return OdometryNoise(values["translation"], values["rotation"])
+    except ValueError as error:
+        raise ValueError(f"{option}: {error}") from None
+
+
+def _show(report: dict[str, Any], out: Path) -> None:
+    from rich.console import Console
+
+    console = Console()
+    console.print(_overview(report))
+    console.print(_objects(report["objects"]))
+    solver = report["solver"]
+    console.print(
+        f"solver: {solver['message']} ({solver['iterations']} iterations, "
+        f"{solver['rejected_steps']} rejected, {solver['seconds']:.2f} s)",
+        markup=False,
+        highlight=False,
+    )
+    console.print(f"wrote {out}", markup=False)
+
+
+def _overview(report: dict[str, Any]) -> "Table":
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    boxes = report["boxes"]
+    table = Table(box=SIMPLE_HEAD, show_header=False)
+    table.add_row("poses", str(report["poses"]))
+    table.add_row("boxes", f"{boxes['count']} of {len(report['objects'])} objects")
+    table.add_row("left out", _left_out(report["dropped_boxes"], report["ids"]))
+    table.add_row(
+        "chi-square of a box",
+        f"median {boxes['chi2_median']:.2f} (3.36 expected); {boxes['outlier_share']:.1%} do not "
+        f"fit (above 13.28), {boxes['not_in_front']} of them not even in front",
+    )
+    error = report["trajectory_error"]
+    if error is None:
+        table.add_row("trajectory error", "unknown: there is nothing to compare with")
+        return table
+    for name, title in (("ate_rmse_m", "rmse after alignment"), ("mean_m", "mean, same start")):
+        before, after = error["before"][name], error["after"][name]
+        word = "better" if after < before else "worse" if after > before else "unchanged"
+        table.add_row(title, f"odometry {before:.4f} m, estimate {after:.4f} m: {word}")
+    return table
+
+
+def _left_out(dropped: dict[str, Any], ids: str) -> str:
+    few = dropped["few_boxes"]
+    reasons = {
+        "below the least score": dropped["below_min_score"],
+        f"without {ids}": dropped["without_id"],
+        "without a pose of their time": dropped["without_pose"],
+        "beside a better box of the same object": dropped["repeated"],
+        f"of objects with fewer than 3: {', '.join(map(str, few))}": sum(few.values()),
+    }
+    return "\n".join(f"{count} {why}" for why, count in reasons.items() if count) or "none"
+
+
+def _objects(objects: list[dict[str, Any]]) -> "Table":
+    from rich.box import SIMPLE_HEAD
+    from rich.markup import escape
+    from rich.table import Table
+
+    table = Table(box=SIMPLE_HEAD)
+    for heading in ("id", "class", "boxes", "chi-square, median", "do not fit", "not in front"):
+        table.add_column(heading, justify="left" if heading == "class" else "right")
+    for entry in objects:
+        table.add_row(
+            str(entry["id"]),
+            escape(entry["class_name"]),
+            str(entry["observations"]),
+            f"{entry['chi2_median']:.2f}",
+            f"{entry['outlier_share']:.0%}",
+            str(entry["not_in_front"]),
+        )
+    return table
