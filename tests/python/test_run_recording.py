@@ -2,7 +2,6 @@ import json
 
 import numpy as np
 import pytest
-from orbit import CAMERA, NAMES, make_orbit, write_orbit
 
 from dqslam import _core
 from dqslam.evaluate import absolute_trajectory_error, center_errors
@@ -16,6 +15,7 @@ from dqslam.run_recording import (
     run,
     scene_size_prior,
 )
+from orbit import CAMERA, NAMES, make_orbit, write_orbit
 
 NOISE = OdometryNoise(translation_m=0.01, rotation_rad=0.01)
 

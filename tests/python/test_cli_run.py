@@ -1,0 +1,176 @@
+import json
+
+import numpy as np
+import pytest
+
+from dqslam.cli import main
+from dqslam.cli.run import parse_noise
+from dqslam.io import OdometryNoise, read_trajectory
+from orbit import NAMES, make_orbit, write_orbit
+
+PERTURB = ("--perturb-odometry", "translation=0.01,rotation=0.01")
+
+
+@pytest.fixture(scope="module")
+def orbit():
+    return make_orbit(noise_px=1.0)
+
+
+@pytest.fixture
+def files(tmp_path, orbit):
+    return write_orbit(tmp_path, orbit)
+
+
+def call(files, *more):
+    camera, odometry, detections = map(str, files)
+    out = str(files[0].parent / "out")
+    names = ("--camera", camera, "--odometry", odometry, "--detections", detections, "--out", out)
+    return main(["run", *names, *more])
+
+
+def report(files):
+    return json.loads((files[0].parent / "out" / "report.json").read_text())
+
+
+def test_writes_what_it_says(files, orbit, capsys):
+    assert call(files, *PERTURB, "--seed", "1", "--ids", "class_id") == 0
+    out = files[0].parent / "out"
+    assert sorted(path.name for path in out.iterdir()) == [
+        "map.json",
+        "odometry.txt",
+        "report.json",
+        "trajectory.txt",
+    ]
+    for name in ("trajectory.txt", "odometry.txt"):
+        times, poses = read_trajectory(out / name)
+        np.testing.assert_array_equal(times, orbit.times)
+        np.testing.assert_allclose(poses[0], orbit.poses[0], atol=1e-8)
+    error = report(files)["trajectory_error"]
+    for name, when in (("trajectory.txt", "after"), ("odometry.txt", "before")):
+        _, poses = read_trajectory(out / name)
+        mean = np.linalg.norm(poses[:, :3] - orbit.poses[:, :3], axis=1).mean()
+        assert error[when]["mean_m"] == pytest.approx(mean, abs=1e-7)
+    assert error["after"]["ate_rmse_m"] < 0.4 * error["before"]["ate_rmse_m"]
+    shown = capsys.readouterr()
+    assert shown.err == ""
+    assert f"odometry {error['before']['mean_m']:.4f} m" in shown.out
+    assert "better" in shown.out
+
+
+def test_the_map_has_the_objects(files, orbit):
+    assert call(files, "--mode", "mapping") == 0
+    objects = json.loads((files[0].parent / "out" / "map.json").read_text())["objects"]
+    assert [entry["id"] for entry in objects] == [name + 100 for name in NAMES]
+    assert [entry["class_name"] for entry in objects] == list(NAMES.values())
+    for entry in objects:
+        name = entry["id"] - 100
+        np.testing.assert_allclose(entry["center"], orbit.centers[name], atol=0.01)
+        np.testing.assert_allclose(
+            entry["semi_axes"], sorted(orbit.semi_axes[name], reverse=True), atol=0.02
+        )
+        assert entry["observations"] == len(orbit.times)
+        quadric = np.array(entry["dual_quadric"])
+        assert quadric[3, 3] == 1
+        np.testing.assert_allclose(quadric[:3, 3], entry["center"])
+
+
+def test_report_names_the_settings_and_what_was_dropped(files):
+    assert call(files, *PERTURB, "--seed", "7", "--odometry-noise", "translation=1,rotation=2") == 0
+    content = report(files)
+    assert content["odometry_noise_added"] == {
+        "translation_m": 0.01,
+        "rotation_rad": 0.01,
+        "seed": 7,
+    }
+    assert content["odometry_noise_believed"] == {"translation_m": 1.0, "rotation_rad": 2.0}
+    assert content["dropped_boxes"]["below_min_score"] == 0
+    assert content["reference"] == "odometry before the added noise"
+    assert (content["poses"], content["boxes"]["count"]) == (40, 160)
+
+
+def test_without_truth_no_error_is_claimed(files, capsys):
+    assert call(files) == 0
+    assert report(files)["trajectory_error"] is None
+    assert "unknown" in capsys.readouterr().out
+
+
+def test_groundtruth_file_is_the_reference(files):
+    truth = files[0].parent / "truth.txt"
+    truth.write_text(files[1].read_text())
+    assert call(files, *PERTURB, "--groundtruth", str(truth)) == 0
+    from_file = report(files)
+    assert from_file["reference"] == "file"
+    assert call(files, *PERTURB) == 0
+    assert report(files)["trajectory_error"] == from_file["trajectory_error"]
+
+
+def test_same_seed_same_files(files):
+    contents = []
+    for _ in range(2):
+        assert call(files, *PERTURB, "--seed", "5") == 0
+        out = files[0].parent / "out"
+        contents.append([(out / name).read_bytes() for name in ("trajectory.txt", "map.json")])
+    assert contents[0] == contents[1]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--camera", "none.json"), "none.json: no such file"),
+        (("--odometry", "none.txt"), "none.txt: no such file"),
+        (("--detections", "none.csv"), "none.csv: no such file"),
+        (("--groundtruth", "none.txt"), "none.txt: no such file"),
+        (("--min-score", "1.5"), "min_score is 1.5, not between 0 and 1"),
+        (("--min-score", "0.95"), "no object is left of 160 boxes"),
+        (("--ids", "name"), "'--ids'"),
+        (("--perturb-odometry", "0.02,0.01"), 'is not like "translation='),
+        (("--perturb-odometry", "translation=0.02"), 'is not like "translation='),
+        (("--perturb-odometry", "translation=a,rotation=1"), 'is not like "translation='),
+        (("--odometry-noise", "translation=0,rotation=1"), "translation is 0, not positive"),
+        (("--odometry-noise", "translation=1,rotation=nan"), "rotation is nan, not positive"),
+        (("--seed", "-1"), "'--seed'"),
+    ],
+)
+def test_bad_arguments_are_one_line_and_code_2(files, capsys, arguments, message):
+    assert call(files, *arguments) == 2
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    assert message in shown.err
+    assert shown.err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "message"),
+    [
+        (0, '"fx": 500.0', '"fx": -500.0', "camera.json:1: fx is -500, not positive"),
+        (0, '"fx": 500.0, ', "", "camera.json: missing fx"),
+        (0, "}", "", "camera.json:1: not JSON"),
+        (1, "\n100.1 ", "\n99.1 ", "traj.txt:2: time 99.1 goes back from 100.0 (line 1)"),
+        (1, "\n100.1 ", "\n100.0 ", "traj.txt:2: time 100.0 repeats 100.0"),
+        (1, "\n100.1 ", "\n100.1 nan ", "traj.txt:2: 9 fields, not 8"),
+        (2, ",x2,", ",right,", "boxes.csv:1: no column x2"),
+        (2, "\n0,100.0,", "\n0,nan,", "boxes.csv:2: timestamp is nan, not finite"),
+        (2, ",0.9,1,cup,101\n1,", ",0.9,1,cup\n1,", "fields, but 10 columns"),
+    ],
+)
+def test_bad_files_are_one_line_and_code_2(files, capsys, file, old, new, message):
+    text = files[file].read_text()
+    assert old in text
+    files[file].write_text(text.replace(old, new, 1))
+    assert call(files) == 2
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    assert message in shown.err
+    assert shown.err.count("\n") == 1
+
+
+def test_an_output_that_is_a_file(files, capsys):
+    (files[0].parent / "out").write_text("mine")
+    assert call(files) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+    assert (files[0].parent / "out").read_text() == "mine"
+
+
+def test_parse_noise():
+    assert parse_noise("--x", "rotation=0.5, translation=1e-2") == OdometryNoise(0.01, 0.5)
+    assert parse_noise("--x", None) is None
