@@ -44,8 +44,7 @@ def as_floats(name: str, values: ArrayLike, shape: Sequence[int | None]) -> Floa
     if array.size == 0 and None in shape:
         array = array.reshape([0 if size is None else size for size in shape])
     _check_shape(name, array, shape)
-    rows = array.reshape(len(array), -1) if shape[0] is None else array.reshape(1, -1)
-    reject_rows(name, ~np.isfinite(rows), "not finite", rows)
+    reject_rows(name, ~np.isfinite(array), "not finite", array)
     array.setflags(write=False)
     return array
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,69 +13,94 @@ from dqslam.recording import Truth
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 # The paper's colours, in shades that the colour-blind can tell apart (Okabe and Ito).
 ODOMETRY, TRUTH, ESTIMATE = "#0072B2", "#009E73", "#D55E00"
-COLUMNS = 3
-_WINDOW_M = 6.0  # shown around the true trajectory, so that a diverged one does not shrink it
+_COLUMNS = 3
+_AROUND_M = 8.0  # shown around the truth at most: what has diverged must not shrink the rest
+_PANEL_INCHES = 4.2
 _CIRCLE = np.stack([f(np.linspace(0.0, 2.0 * np.pi, 73)) for f in (np.cos, np.sin)])
 
 
 def plot_maps(maps: Sequence[tuple[str, Estimate, Truth]], path: str | Path) -> None:
-    """Draw maps of (title, estimate, truth) side by side into an image file.
+    """Draw maps of (title, estimate, truth) side by side, all alike in scale, into an image file.
 
     Trajectories are lines, objects their outlines from above. A true object that is no ellipsoid
-    is a circle of its volume, a mapped one that is none a cross.
+    is a disc of its volume, a mapped one that is none a cross.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     if not maps:
         raise ValueError("there are no maps to draw")
-    columns = min(COLUMNS, len(maps))
+    columns = min(_COLUMNS, len(maps))
     rows = -(-len(maps) // columns)
-    figure = Figure(figsize=(4.4 * columns, 3.6 * rows + 0.5), layout="constrained")
+    low, high = _window(maps)
+    height = _PANEL_INCHES * (high - low)[1] / (high - low)[0]
+    size = (_PANEL_INCHES * columns + 0.6, (height + 0.25) * rows + 0.9)
+    figure = Figure(figsize=size, layout="constrained")
     FigureCanvasAgg(figure)
-    grid = figure.subplots(rows, columns, squeeze=False)
+    grid = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
     for axes, (title, estimate, truth) in zip(grid.flat, maps, strict=False):
         _draw_map(axes, estimate, truth)
+        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
         axes.set_title(title, fontsize=10)
+        axes.grid(alpha=0.25, linewidth=0.5)
     for axes in grid.flat[len(maps) :]:
         axes.set_axis_off()
-    handles, labels = grid[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), frameon=False)
+    for axes in grid[-1]:
+        axes.set_xlabel("x [m]")
+    for axes in grid[:, 0]:
+        axes.set_ylabel("y [m]")
+    _draw_legend(figure)
     figure.savefig(path, dpi=150)
 
 
+def _window(maps: Sequence[tuple[str, Estimate, Truth]]) -> tuple[Floats, Floats]:
+    """Return the corners (2,) of what is shown: all of the truth, and what stays near it."""
+    lows, highs = [], []
+    for _, estimate, truth in maps:
+        low, high = truth.poses[:, :2].min(axis=0), truth.poses[:, :2].max(axis=0)
+        others = np.vstack([estimate.initial_poses, estimate.poses])[:, :2]
+        lows.append(np.clip(others.min(axis=0), low - _AROUND_M, low) - 1.0)
+        highs.append(np.clip(others.max(axis=0), high, high + _AROUND_M) + 1.0)
+    return np.min(lows, axis=0), np.max(highs, axis=0)
+
+
 def _draw_map(axes: "Axes", estimate: Estimate, truth: Truth) -> None:
-    _draw_path(axes, estimate.initial_poses, ODOMETRY, "odometry", 1.2)
-    _draw_path(axes, truth.poses, TRUTH, "truth", 2.6)
-    _draw_path(axes, estimate.poses, ESTIMATE, "estimate", 1.2)
+    _draw_path(axes, estimate.initial_poses, color=ODOMETRY, linewidth=1.1)
+    _draw_path(axes, truth.poses, color=TRUTH, linewidth=3.0, alpha=0.8)
+    _draw_path(axes, estimate.poses, color=ESTIMATE, linewidth=1.1)
+    axes.plot(*truth.poses[0, :2], "o", color="black", markersize=4, zorder=3)
     for outline in _true_outlines(truth):
-        axes.fill(*outline, facecolor=TRUTH, alpha=0.35, edgecolor=TRUTH, linewidth=1.0)
-    for center, shape, real in zip(
-        estimate.centers, estimate.shapes, estimate.is_ellipsoid, strict=True
-    ):
-        if real:
-            axes.plot(*_outline(center, shape), color=ESTIMATE, linewidth=1.4)
+        axes.fill(*outline, color=TRUTH, alpha=0.4, linewidth=0)
+    objects = zip(estimate.centers, estimate.shapes, estimate.is_ellipsoid, strict=True)
+    for center, shape, is_ellipsoid in objects:
+        if is_ellipsoid:
+            axes.plot(*_outline(center, shape), color=ESTIMATE, linewidth=1.2)
         else:
             axes.plot(*center[:2], "x", color=ESTIMATE, markersize=5)
-    _frame(axes, truth.poses[:, :2], np.vstack([estimate.initial_poses, estimate.poses])[:, :2])
 
 
-def _draw_path(axes: "Axes", poses: Floats, color: str, label: str, width: float) -> None:
-    axes.plot(*poses[:, :2].T, color=color, label=label, linewidth=width, solid_capstyle="round")
+def _draw_legend(figure: "Figure") -> None:
+    from matplotlib.lines import Line2D
+
+    handles = [
+        Line2D([], [], color=ODOMETRY, linewidth=1.1, label="odometry"),
+        Line2D([], [], color=TRUTH, linewidth=3.0, alpha=0.8, label="truth"),
+        Line2D([], [], color=ESTIMATE, linewidth=1.1, label="estimate"),
+        Line2D([], [], color="black", marker="o", linewidth=0, markersize=4, label="start"),
+        Line2D([], [], color=TRUTH, marker="o", alpha=0.4, linewidth=0, label="true object"),
+        Line2D(
+            [], [], color=ESTIMATE, marker="o", fillstyle="none", linewidth=0, label="mapped object"
+        ),
+    ]
+    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), frameon=False)
 
 
-def _frame(axes: "Axes", true_places: Floats, places: Floats) -> None:
-    """Show all of the truth, and the rest as far as it stays near."""
-    low, high = true_places.min(axis=0) - _WINDOW_M, true_places.max(axis=0) + _WINDOW_M
-    axes.set_xlim(max(low[0], places[:, 0].min() - 1.0), min(high[0], places[:, 0].max() + 1.0))
-    axes.set_ylim(max(low[1], places[:, 1].min() - 1.0), min(high[1], places[:, 1].max() + 1.0))
-    axes.set_aspect("equal", adjustable="datalim")
-    axes.set_xlabel("x [m]")
-    axes.set_ylabel("y [m]")
-    axes.grid(alpha=0.25, linewidth=0.5)
+def _draw_path(axes: "Axes", poses: Floats, **style: Any) -> None:
+    axes.plot(*poses[:, :2].T, solid_capstyle="round", **style)
 
 
 def _true_outlines(truth: Truth) -> list[Floats]:

@@ -16,9 +16,14 @@ if TYPE_CHECKING:
     from dqslam.experiment import PaperTable, RowName, Statistics
     from dqslam.scenario import Scenario
 
-TITLES: "dict[RowName, str]" = {
+ROWS: "dict[RowName, str]" = {
     "monocular": "monocular",
     "relative_position": "relative position",
+}
+METRICS = {
+    "rmse_pos": "positions, m",
+    "rmse_landmark": "objects' centres, m",
+    "rmse_volume": "objects' volumes, m\u00b3",
 }
 EXAMPLES = 6  # maps drawn, as in the paper's figure
 
@@ -58,12 +63,11 @@ def paper(
             progress=progress,
         )
     table.save(out / "table.json")
-    # Wide enough for the table whatever the terminal: a wrapped line is easier read than a cut one.
-    console = Console(width=max(100, Console().width))
+    console = Console()
     console.print(_results(table))
     if method == "paper":
         console.print(_scan(table))
-    for row, title in TITLES.items():
+    for row, title in ROWS.items():
         for failed, why in table.best(row).failures.items():
             console.print(f"failed: {title}, seed {failed}: {why}", markup=False)
     console.print(f"wrote {out / 'table.json'}", markup=False)
@@ -83,62 +87,60 @@ def _progress(trials: int) -> Iterator[Callable[[int, int], None]]:
 
 
 def _results(table: "PaperTable") -> "Table":
-    """Lay out the paper's printed rows beside ours."""
+    """Lay out the paper's printed numbers beside ours."""
+    from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
-    from dqslam.experiment import METRICS, PAPER_ODOMETRY, PAPER_ROWS
+    from dqslam.experiment import PAPER_ODOMETRY, PAPER_ROWS
 
-    seeds = f"{table.seeds[0]}..{table.seeds[-1]}"
     shown = Table(
-        title=f"{len(table.seeds)} trials, seeds {seeds}, {table.objects}, method {table.method}",
-        caption="avg / med / max over the trials; the paper prints avg / med",
+        title=f"{len(table.seeds)} trials, seeds {table.seeds[0]}..{table.seeds[-1]}, "
+        f"{table.objects}, method {table.method}",
+        box=SIMPLE_HEAD,
     )
-    for heading in ("", "", "position [m]", "objects [m]", "volume [m\u00b3]", "failed", "s/trial"):
-        shown.add_column(heading, justify="left" if heading == "" else "right", no_wrap=True)
-    shown.add_row("odometry", "paper", _numbers(PAPER_ODOMETRY), style="dim")
-    shown.add_row("", "ours", _numbers(table.odometry), end_section=True)
-    for name, title in TITLES.items():
+    shown.add_column("mean error of", no_wrap=True)
+    for heading in ("paper avg", "med", "ours avg", "med", "max"):
+        shown.add_column(heading, justify="right", no_wrap=True)
+    shown.add_row("odometry alone", style="bold")
+    shown.add_row("  positions, m", *_cells(PAPER_ODOMETRY), *_cells(table.odometry))
+    for name, title in ROWS.items():
         printed, row = PAPER_ROWS[name], table.best(name)
-        shown.add_row(
-            title, "paper", *[_numbers(printed[metric]) for metric in METRICS], style="dim"
-        )
-        shown.add_row(
-            "",
-            "ours",
-            *[_numbers(row.metrics[metric]) for metric in METRICS],
-            str(len(row.failures)),
-            f"{row.seconds_med:.2f}",
-            end_section=True,
-        )
+        shown.add_row()
+        shown.add_row(title, style="bold")
+        for metric, label in METRICS.items():
+            shown.add_row(f"  {label}", *_cells(printed[metric]), *_cells(row.metrics[metric]))
+        shown.add_row("  trials failed", "", "", str(len(row.failures)))
+        shown.add_row("  seconds a trial", "", "", "", f"{row.seconds_med:.2f}")
     return shown
 
 
 def _scan(table: "PaperTable") -> "Table":
     """Show what each weight of the paper's box residual gives."""
+    from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
     shown = Table(
-        title="position error [m] by sigma of the algebraic residual, which the paper leaves open",
-        caption="avg / med / max (failed); * is used above",
+        title="mean error of positions, m, by the sigma of the box residual, which the paper does\n"
+        "not state; the best of each, marked *, stands above",
+        box=SIMPLE_HEAD,
     )
     shown.add_column("sigma", justify="right")
-    for title in TITLES.values():
-        shown.add_column(title, justify="right", no_wrap=True)
-    for rows in zip(*[table.scan[name] for name in TITLES], strict=True):
+    for title in ROWS.values():
+        for heading in (f"{title}: avg", "med", "max", "failed"):
+            shown.add_column(heading, justify="right", no_wrap=True)
+    for rows in zip(*[table.scan[name] for name in ROWS], strict=True):
         cells = []
-        for name, row in zip(TITLES, rows, strict=True):
-            failed = f" ({len(row.failures)})" if row.failures else ""
-            used = " *" if row is table.best(name) else "  "
-            cells.append(_numbers(row.metrics["rmse_pos"]) + failed + used)
+        for name, row in zip(ROWS, rows, strict=True):
+            mark = " *" if row is table.best(name) else "  "
+            cells += [*_cells(row.metrics["rmse_pos"]), f"{len(row.failures)}{mark}"]
         shown.add_row(f"{rows[0].algebraic_sigma:.0e}", *cells)
     return shown
 
 
-def _numbers(values: "Statistics | tuple[float, float]") -> str:
-    if not isinstance(values, tuple):
-        values = (values.avg, values.med, values.max)
-    # Quadrics that are far off have volumes no fixed notation can show.
-    return " / ".join(f"{value:.2f}" if value < 1e4 else f"{value:.0e}" for value in values)
+def _cells(values: "Statistics | tuple[float, float]") -> list[str]:
+    numbers = values if isinstance(values, tuple) else (values.avg, values.med, values.max)
+    # Quadrics that are far off have volumes that no fixed notation can show.
+    return [f"{number:.2f}" if not number >= 1e4 else f"{number:.0e}" for number in numbers]
 
 
 def _draw(scenario: "Scenario", table: "PaperTable", path: Path, console: "Console") -> None:

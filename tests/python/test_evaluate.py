@@ -1,0 +1,195 @@
+import numpy as np
+import pytest
+
+import oracle
+from dqslam import Camera, Estimate, PoseModel, _core, evaluate
+from dqslam.evaluate import (
+    absolute_trajectory_error,
+    align_rigid,
+    center_errors,
+    cube_volumes,
+    position_error,
+)
+from dqslam.recording import Truth
+
+RANDOM = np.random.default_rng(5)
+
+
+def quadric(center, shape):
+    """q1 .. q9 of centre and shape, written out: upper triangle of c c^T - S, and c."""
+    c, m = np.asarray(center), np.outer(center, center) - np.asarray(shape)
+    return [m[0, 0], m[0, 1], m[0, 2], c[0], m[1, 1], m[1, 2], c[1], m[2, 2], c[2]]
+
+
+def estimate(poses, quadrics, object_ids, ellipsoids=None):
+    poses, quadrics = np.array(poses, dtype=float), np.array(quadrics, dtype=float)
+    return Estimate(
+        pose_model=PoseModel.SE2,
+        camera=Camera(500.0, 500.0, 319.5, 239.5, 640, 480),
+        timestamps=np.arange(len(poses), dtype=float),
+        poses=poses,
+        initial_poses=poses + [3.0, 4.0, 0.0],
+        object_ids=np.array(object_ids),
+        class_names=("cube",) * len(object_ids),
+        observations=np.ones(len(object_ids), dtype=np.int64),
+        dual_quadrics=quadrics,
+        ellipsoids=np.zeros((len(object_ids), 9)) if ellipsoids is None else ellipsoids,
+    )
+
+
+def truth(poses, center, volume):
+    return Truth(
+        pose_model=PoseModel.SE2,
+        poses=poses,
+        object_id=[4, 5, 6],
+        center=center,
+        volume=volume,
+        class_name=("cube",) * 3,
+    )
+
+
+TRUE_POSES = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]]
+TRUE_CENTERS = [[9.0, 9.0, 9.0], [1.0, 2.0, 0.0], [5.0, 5.0, 1.0]]
+
+
+def test_the_papers_metrics_by_hand():
+    # Errors of 0, 5 and 1 m; a wrong heading does not count. Objects 6 and 5 are 2 and 1 m off.
+    found = estimate(
+        poses=[[0.0, 0.0, 3.0], [4.0, 4.0, 0.0], [2.0, -1.0, 0.0]],
+        quadrics=[
+            quadric([5.0, 7.0, 1.0], np.diag([0.25, 1.0, 4.0])),  # cube of side 2 * 0.5
+            quadric([1.0, 2.0, -1.0], np.diag([4.0, 1.0, 9.0])),  # cube of side 2 * 1
+        ],
+        object_ids=[6, 5],
+    )
+    report = evaluate(found, truth(TRUE_POSES, TRUE_CENTERS, [100.0, 2.0, 1.5]))
+    assert report.rmse_pos == pytest.approx((0.0 + 5.0 + 1.0) / 3.0)
+    assert report.odometry_rmse_pos == pytest.approx(
+        (5.0 + np.hypot(6.0, 8.0) + np.hypot(3.0, 3.0)) / 3.0
+    )
+    assert report.rmse_landmark == pytest.approx((2.0 + 1.0) / 2.0)
+    assert report.rmse_volume == pytest.approx((abs(1.0 - 1.5) + abs(8.0 - 2.0)) / 2.0)
+    assert (report.mapped, report.not_ellipsoids) == (2, 0)
+    assert "position error     2.000 m   (odometry 6.414 m)" in str(report)
+
+
+def test_objects_that_are_no_ellipsoids_are_counted():
+    no_ellipsoid = np.array([[np.nan] * 9, [0.0] * 9])
+    quadrics = [quadric([1, 2, 0], -np.eye(3)), quadric([5, 5, 1], np.eye(3))]
+    found = estimate(TRUE_POSES, quadrics, [5, 6], no_ellipsoid)
+    report = evaluate(found, truth(TRUE_POSES, TRUE_CENTERS, [1.0, 8.0, 8.0]))
+    assert report.not_ellipsoids == 1
+    # S = -I, the paper's own start: its cube has the side 2 sqrt|-1|.
+    assert report.rmse_volume == pytest.approx(0.0)
+
+
+def test_cube_volume_is_of_the_smallest_axis_whatever_the_orientation():
+    semi_axes = np.array([0.7, 0.2, 0.4])
+    for _ in range(5):
+        xyzw = RANDOM.normal(size=4)
+        rotation = oracle.quaternion_matrix(xyzw / np.linalg.norm(xyzw))
+        shape = rotation @ np.diag(semi_axes**2) @ rotation.T
+        np.testing.assert_allclose(cube_volumes(shape[None]), 0.4**3)
+
+
+def test_an_object_that_the_truth_does_not_know_is_refused():
+    found = estimate(TRUE_POSES, [quadric([0, 0, 0], np.eye(3))], [9])
+    with pytest.raises(ValueError, match="object 9 of the estimate is not in the truth"):
+        evaluate(found, truth(TRUE_POSES, TRUE_CENTERS, [1.0] * 3))
+
+
+def test_position_error_of_se3_has_three_axes():
+    true = np.tile([0.0, 0, 0, 0, 0, 0, 1], (2, 1))
+    moved = true + [[2.0, 3.0, 6.0, 0, 0, 0, 0], [0.0] * 7]
+    assert position_error(PoseModel.SE3, moved, true) == pytest.approx(3.5)
+
+
+@pytest.mark.parametrize("size", [2, 3])
+def test_alignment_undoes_a_rigid_motion(size):
+    points = RANDOM.normal(size=(12, size))
+    turned = oracle.quaternion_matrix([0.6, 0.0, 0.0, 0.8])  # about x
+    turn = turned if size == 3 else turned[1:, 1:]
+    moved = points @ turn.T + np.arange(size)
+    alignment = align_rigid(points, moved)
+    np.testing.assert_allclose(alignment.rotation, turn, atol=1e-12)
+    np.testing.assert_allclose(alignment.translation, np.arange(size), atol=1e-12)
+    np.testing.assert_allclose(alignment.apply(points), moved, atol=1e-12)
+
+
+@pytest.mark.parametrize("size", [2, 3])
+def test_alignment_never_mirrors_nor_scales(size):
+    points = RANDOM.normal(size=(12, size))
+    mirrored = 3.0 * points * np.array([-1.0, 1.0, 1.0])[:size]
+    rotation = align_rigid(points, mirrored).rotation
+    np.testing.assert_allclose(rotation @ rotation.T, np.eye(size), atol=1e-12)
+    assert np.linalg.det(rotation) == pytest.approx(1.0)
+
+
+def test_alignment_is_the_best_of_its_neighbours():
+    points = RANDOM.normal(size=(30, 3))
+    target = points + 0.3 * RANDOM.normal(size=(30, 3))
+    alignment = align_rigid(points, target)
+    least = np.sum((alignment.apply(points) - target) ** 2)
+    for _ in range(50):
+        xyzw = np.append(0.02 * RANDOM.normal(size=3), 1.0)
+        turn = oracle.quaternion_matrix(xyzw / np.linalg.norm(xyzw))
+        shift = 0.02 * RANDOM.normal(size=3)
+        assert np.sum((alignment.apply(points) @ turn.T + shift - target) ** 2) > least
+
+
+def test_alignment_of_a_straight_line_still_fits():
+    line = np.column_stack([np.arange(5.0), np.zeros(5), np.zeros(5)])
+    moved = line[:, [2, 0, 1]] + 1.0
+    np.testing.assert_allclose(align_rigid(line, moved).apply(line), moved, atol=1e-12)
+
+
+TRUE = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+
+
+def test_trajectory_error_by_hand():
+    error = absolute_trajectory_error(
+        TRUE + [[0, 0, 1], [0, 0, 2], [0, 0, 3], [0, 0, 6]], TRUE, align="none"
+    )
+    assert (error.mean, error.median, error.max) == (3.0, 2.5, 6.0)
+    assert error.rmse == pytest.approx(np.sqrt((1 + 4 + 9 + 36) / 4.0))
+    np.testing.assert_array_equal(error.alignment.rotation, np.eye(3))
+
+
+def test_se2_alignment_keeps_heights():
+    turned = TRUE @ oracle.quaternion_matrix([0, 0, 0.6, 0.8]).T + [5.0, 6.0, 2.0]
+    on_plane = absolute_trajectory_error(turned, TRUE, align="se2")
+    assert on_plane.mean == pytest.approx(2.0)
+    assert absolute_trajectory_error(turned, TRUE, align="se3").max == pytest.approx(0.0, abs=1e-12)
+
+
+def test_object_centres_use_the_trajectorys_alignment():
+    turn = oracle.quaternion_matrix([0, 0, 0.6, 0.8])
+    alignment = absolute_trajectory_error(TRUE @ turn.T + 7.0, TRUE).alignment
+    true_centers = np.array([[3.0, 4.0, 5.0], [0.0, 0.0, 0.0]])
+    centers = (true_centers + [[0.0, 0.0, 0.5], [1.0, 0.0, 0.0]]) @ turn.T + 7.0
+    np.testing.assert_allclose(center_errors(centers, true_centers, alignment), [0.5, 1.0])
+
+
+@pytest.mark.parametrize(
+    ("points", "true_points", "align", "message"),
+    [
+        (TRUE, TRUE[:3], "se3", r"differ in shape: \(4, 3\), \(3, 3\)"),
+        (TRUE[:0], TRUE[:0], "se3", "no points to compare"),
+        (TRUE[:1], TRUE[:1], "se3", "expected two points or more, got 1"),
+        (TRUE[:, :2], TRUE[:, :2], "se3", r"expected shape \(n, 3\), got \(4, 2\)"),
+        (TRUE * np.nan, TRUE, "se3", "estimated points row 0: not finite"),
+        (TRUE, TRUE, "sim3", '"none", "se2" or "se3", got \'sim3\''),
+    ],
+)
+def test_bad_trajectories_are_refused(points, true_points, align, message):
+    with pytest.raises(ValueError, match=message):
+        absolute_trajectory_error(points, true_points, align=align)
+
+
+def test_estimate_reads_centres_and_shapes_from_quadrics():
+    ellipsoid = _core.ellipsoid_from_axes([1.0, -2.0, 0.5], [0.5, 0.3, 0.2], [0.6, 0.0, 0.0, 0.8])
+    found = estimate(TRUE_POSES, [_core.dual_quadric_from_ellipsoid(ellipsoid)], [4])
+    rotation = oracle.quaternion_matrix([0.6, 0.0, 0.0, 0.8])
+    np.testing.assert_allclose(found.centers, [[1.0, -2.0, 0.5]])
+    shape = rotation @ np.diag([0.25, 0.09, 0.04]) @ rotation.T
+    np.testing.assert_allclose(found.shapes[0], shape, atol=1e-12)

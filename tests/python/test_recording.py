@@ -1,0 +1,147 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dqslam import Camera, Detections, Odometry, PoseModel, Recording, RelativePositions
+from dqslam.recording import Truth
+
+CAMERA = Camera(500.0, 500.0, 319.5, 239.5, 640, 480)
+
+
+def odometry(**changes):
+    values = {
+        "pose_model": PoseModel.SE2,
+        "first_pose": [0.0, 0.0, 0.0],
+        "relative": [[1.0, 0.0, 0.0], [1.0, 0.0, 0.1]],
+        "covariance": np.tile(0.01 * np.eye(3), (2, 1, 1)),
+    }
+    return Odometry(**values | changes)
+
+
+def detections(**changes):
+    values = {
+        "pose": [0, 2],
+        "box": [[10.0, 10.0, 50.0, 60.0], [100.0, 100.0, 200.0, 150.0]],
+        "score": [1.0, 0.5],
+        "class_id": [3, 3],
+        "object_id": [7, -1],
+        "class_names": {3: "cup"},
+    }
+    return Detections(**values | changes)
+
+
+def positions(**changes):
+    values = {
+        "pose": [1],
+        "object_id": [7],
+        "object_in_robot": [[1.0, 2.0, 0.0]],
+        "covariance": [0.01 * np.eye(3)],
+    }
+    return RelativePositions(**values | changes)
+
+
+def recording(**changes):
+    values = {
+        "camera": CAMERA,
+        "timestamps": [0.0, 0.5, 1.0],
+        "odometry": odometry(),
+        "detections": detections(),
+        "positions": positions(),
+    }
+    return Recording(**values | changes)
+
+
+def truth(**changes):
+    values = {
+        "pose_model": PoseModel.SE2,
+        "poses": np.zeros((3, 3)),
+        "object_id": [0, 1],
+        "center": np.zeros((2, 3)),
+        "volume": [1.0, 2.0],
+        "class_name": ("cup", "cup"),
+    }
+    return Truth(**values | changes)
+
+
+def test_arrays_are_copied_and_read_only():
+    box = np.array([[10.0, 10.0, 50.0, 60.0], [100.0, 100.0, 200.0, 150.0]])
+    kept = detections(box=box)
+    box[:] = 0.0
+    assert kept.box[1].tolist() == [100.0, 100.0, 200.0, 150.0]
+    with pytest.raises(ValueError, match="read-only"):
+        kept.box[0, 0] = 1.0
+    assert kept.object_id.dtype == np.int64
+
+
+def test_a_recording_may_have_no_boxes_and_no_positions():
+    none = Detections(pose=[], box=[], score=[], class_id=[], object_id=[])
+    assert none.box.shape == (0, 4)
+    assert len(recording(detections=none, positions=None).detections) == 0
+
+
+NOT_SYMMETRIC = np.eye(3) + np.array([[0, 1, 0], [0, 0, 0], [0, 0, 0]])
+SINGULAR = np.diag([1.0, 0.0, 1.0])
+HALF_TURN = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.1]
+
+
+@pytest.mark.parametrize(
+    ("make", "changes", "message"),
+    [
+        (odometry, {"relative": [[1.0, 0.0, np.nan]] * 2}, r"odometry\.relative row 0: not finite"),
+        (
+            odometry,
+            {"relative": [[1.0, 0.0]] * 2},
+            r"relative: expected shape \(n, 3\), got \(2, 2",
+        ),
+        (odometry, {"first_pose": [0.0, 0.0]}, r"first_pose: expected shape"),
+        (odometry, {"first_pose": "abc"}, r"first_pose: not an array of numbers"),
+        (odometry, {"covariance": [np.eye(3)]}, r"covariance: expected shape \(2, 3, 3\), got \(1"),
+        (odometry, {"covariance": [np.eye(3), SINGULAR]}, r"covariance row 1: .*positive definite"),
+        (odometry, {"covariance": [np.eye(3), NOT_SYMMETRIC]}, r"covariance row 1: .*symmetric"),
+        (
+            odometry,
+            {"pose_model": PoseModel.SE3, "first_pose": HALF_TURN},
+            r"odometry\.first_pose row 0: quaternion is not of unit length",
+        ),
+        (
+            detections,
+            {"box": [[0, 0, 9, 9], [5, 0, 5, 9]]},
+            r"box row 1: inverted or empty box: \[5",
+        ),
+        (detections, {"box": [[0, 0, 9, 9], [0, 9, 5, 2]]}, r"box row 1: inverted or empty box"),
+        (detections, {"box": [[0, 0, 9, np.inf], [0, 0, 9, 9]]}, r"detections\.box row 0: not fin"),
+        (detections, {"pose": [0]}, r"detections\.pose: expected shape \(2\), got \(1,\)"),
+        (detections, {"pose": [0, 0.5]}, r"detections\.pose row 1: not a whole number: 0\.5"),
+        (detections, {"score": [1.0, np.nan]}, r"detections\.score row 1: not finite"),
+        (detections, {"class_id": [3, 4]}, r"class_id row 1: class has no name: 4"),
+        (detections, {"object_id": [7, -2]}, r"object_id row 1: not an object id: -2"),
+        (positions, {"covariance": [-np.eye(3)]}, r"positions\.covariance row 0: .*positive def"),
+        (positions, {"object_in_robot": [[1.0, 2.0]]}, r"object_in_robot: expected shape \(n, 3"),
+        (recording, {"timestamps": [0.0, 1.0, 1.0]}, r"timestamps row 2: time does not increase"),
+        (recording, {"timestamps": [0.0, 1.0]}, r"timestamps: expected 3, .* got 2"),
+        (
+            recording,
+            {"detections": detections(pose=[0, 3])},
+            r"detections\.pose row 1: no such pose",
+        ),
+        (recording, {"positions": positions(pose=[-1])}, r"positions\.pose row 0: no such pose"),
+        (
+            recording,
+            {"detections": detections(box=[[700.0, 0, 800, 9], [0, 0, 9, 9]])},
+            r"detections\.box row 0: box outside the image: \[700",
+        ),
+        (truth, {"object_id": [1, 1]}, r"truth\.object_id: an id occurs twice"),
+        (truth, {"volume": [1.0, 0.0]}, r"truth\.volume row 1: not positive: 0"),
+        (truth, {"class_name": ("cup",)}, r"truth\.class_name: expected 2, got 1"),
+        (truth, {"ellipsoids": np.zeros((1, 9))}, r"truth\.ellipsoids: expected shape \(2, 9\)"),
+    ],
+)
+def test_bad_input_names_the_array_and_the_row(make, changes, message):
+    with pytest.raises(ValueError, match=message):
+        make(**changes)
+
+
+def test_a_replaced_part_is_checked_again():
+    with pytest.raises(ValueError, match="timestamps row 1"):
+        replace(recording(), timestamps=[0.0, -1.0, 1.0])
