@@ -8,5 +8,6 @@ namespace dqslam {
 void BindGeometry(pybind11::module_& m);
 void BindGraph(pybind11::module_& m);
 void BindSolve(pybind11::module_& m);
+void BindCovariance(pybind11::module_& m);
 
 }  // namespace dqslam

@@ -13,4 +13,5 @@ PYBIND11_MODULE(_core, m) {
   dqslam::BindGeometry(m);
   dqslam::BindGraph(m);
   dqslam::BindSolve(m);
+  dqslam::BindCovariance(m);
 }

@@ -1,0 +1,26 @@
+// How uncertain an estimate is: marginal covariances from the information matrix H = J^T J of all
+// whitened residuals, in the tangent spaces of the poses and the parameters of the objects.
+//
+// Gauge: the first pose is fixed, so that its covariance is zero and all others are relative to it.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "dqslam/optimize.h"
+
+namespace dqslam {
+
+struct Covariance {
+  RowMatrix poses;    ///< (poses, k * k) in the frames of the poses; NaN where under-constrained
+  RowMatrix objects;  ///< (objects, 81) of the landmark parameters; NaN where under-constrained
+  /// One sentence for each pose or object that the data and the priors do not determine.
+  std::vector<std::string> under_constrained;
+};
+
+/// Marginal covariances at a state.  At the true state this is the posterior Cramer-Rao bound.
+/// In mapping mode all poses are fixed.  Throws std::invalid_argument for a state that does not fit
+/// and std::runtime_error where a residual of the last stage is undefined at it.
+Covariance ComputeCovariance(const Graph& graph, const SolveOptions& options, const State& state);
+
+}  // namespace dqslam
