@@ -5,6 +5,7 @@ import signal
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -54,19 +55,19 @@ def candidate_sigmas(method: Method) -> tuple[float | None, ...]:
     return ALGEBRAIC_SIGMAS if method == "paper" else (None,)
 
 
-def method_options(method: Method, algebraic_sigma: float | None = None) -> SolveOptions:
+def method_options(method: Method, algebraic_sigma: float | None) -> SolveOptions:
     """Return the options of the solver: its defaults, or the paper's method as published."""
-    options = SolveOptions()
-    if method == "paper":
-        options.residual = _core.Residual.ALGEBRAIC
-        options.landmark_model = _core.LandmarkModel.DUAL_QUADRIC
-        options.start = _core.Start.IDENTITY
-        options.schedule = _core.Schedule.BATCH
-        options.loss = _core.Loss.NONE
-        options.minimizer = _core.Minimizer.DOGLEG
-        if algebraic_sigma is not None:
-            options.algebraic_sigma = algebraic_sigma
-    return options
+    if method == "dqslam":
+        return SolveOptions()
+    return SolveOptions(
+        residual=_core.Residual.ALGEBRAIC,
+        landmark_model=_core.LandmarkModel.DUAL_QUADRIC,
+        start=_core.Start.IDENTITY,
+        schedule=_core.Schedule.BATCH,
+        loss=_core.Loss.NONE,
+        minimizer=_core.Minimizer.DOGLEG,  # never worse than Levenberg-Marquardt here, and faster
+        algebraic_sigma=algebraic_sigma,
+    )
 
 
 @dataclass(frozen=True)
@@ -294,19 +295,31 @@ def _run_here(scenario: Scenario, seeds: Sequence[int], method: Method) -> Itera
 def _run_in_processes(
     scenario: Scenario, seeds: Sequence[int], method: Method, jobs: int
 ) -> Iterator[Trial]:
-    """Yield trials as they finish; when stopped, wait only for those under way."""
+    """Yield trials as they finish. Ctrl-C in a terminal reaches the workers too, and ends them."""
     # Spawned, not forked: the parent may hold locks of threads that a fork would not copy.
     executor = ProcessPoolExecutor(
-        min(jobs, len(seeds)), multiprocessing.get_context("spawn"), _ignore_interrupts
+        min(jobs, len(seeds)), multiprocessing.get_context("spawn"), _end_on_interrupt
     )
     try:
-        futures = [executor.submit(run_trial, scenario, seed, method) for seed in seeds]
+        with _interrupts_held():  # workers inherit this: while they start they would say much
+            futures = [executor.submit(run_trial, scenario, seed, method) for seed in seeds]
         for future in as_completed(futures):
             yield future.result()
     finally:
         executor.shutdown(cancel_futures=True)
 
 
-def _ignore_interrupts() -> None:
-    """Leave Ctrl-C to the parent, which a terminal sends it to as well."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+@contextmanager
+def _interrupts_held() -> Iterator[None]:
+    """Put off Ctrl-C in this thread."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _end_on_interrupt() -> None:
+    """Let Ctrl-C end this process at once and in silence."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import typer
 
 from dqslam.cli.paper import paper
+from dqslam.cli.run import run
 
 app = typer.Typer(
     name="dqslam",
@@ -15,16 +16,12 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 app.command()(paper)
+app.command()(run)
 
 _INTERRUPTED = 130
 _BAD_INPUT = 2
 # UsageError has no public name in typer; it is what BadParameter derives from.
 _UsageError = typer.BadParameter.__mro__[1]
-
-
-@app.callback()
-def _group() -> None:
-    """Object SLAM with dual quadrics."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

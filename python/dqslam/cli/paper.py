@@ -81,7 +81,8 @@ def _progress(trials: int) -> Iterator[Callable[[int, int], None]]:
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
 
     columns = ("trials", BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), "left")
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    console = Console(stderr=True)
+    with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
         task = bar.add_task("trials", total=trials)
         yield lambda done, _: bar.update(task, completed=done)
 
@@ -94,8 +95,8 @@ def _results(table: "PaperTable") -> "Table":
     from dqslam.experiment import PAPER_ODOMETRY, PAPER_ROWS
 
     shown = Table(
-        title=f"{len(table.seeds)} trials, seeds {table.seeds[0]}..{table.seeds[-1]}, "
-        f"{table.objects}, method {table.method}",
+        title=f"seeds {table.seeds[0]} to {table.seeds[-1]}, {table.objects}, "
+        f"method {table.method}",
         box=SIMPLE_HEAD,
     )
     shown.add_column("mean error of", no_wrap=True)
@@ -120,20 +121,22 @@ def _scan(table: "PaperTable") -> "Table":
     from rich.table import Table
 
     shown = Table(
-        title="mean error of positions, m, by the sigma of the box residual, which the paper does\n"
-        "not state; the best of each, marked *, stands above",
+        title="positions, m, by sigma of the box residual\n"
+        "(the paper does not state it; the best of each, *, stands above)",
         box=SIMPLE_HEAD,
     )
-    shown.add_column("sigma", justify="right")
+    shown.add_column("\nsigma", justify="right", no_wrap=True)
     for title in ROWS.values():
-        for heading in (f"{title}: avg", "med", "max", "failed"):
+        for heading in (f"{title}\navg", "\nmed", "\nmax"):
             shown.add_column(heading, justify="right", no_wrap=True)
+    shown.add_column("\nfailed", justify="right", no_wrap=True)
     for rows in zip(*[table.scan[name] for name in ROWS], strict=True):
         cells = []
         for name, row in zip(ROWS, rows, strict=True):
-            mark = " *" if row is table.best(name) else "  "
-            cells += [*_cells(row.metrics["rmse_pos"]), f"{len(row.failures)}{mark}"]
-        shown.add_row(f"{rows[0].algebraic_sigma:.0e}", *cells)
+            avg, *others = _cells(row.metrics["rmse_pos"])
+            cells += ["* " + avg if row is table.best(name) else avg, *others]
+        failed = sum(len(row.failures) for row in rows)
+        shown.add_row(f"{rows[0].algebraic_sigma:.0e}", *cells, str(failed))
     return shown
 
 

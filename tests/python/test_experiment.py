@@ -1,0 +1,194 @@
+import json
+import multiprocessing
+
+import numpy as np
+import pytest
+
+from dqslam import experiment, load_scenario
+from dqslam.evaluate import Report
+from dqslam.experiment import (
+    ALGEBRAIC_SIGMAS,
+    Outcome,
+    Statistics,
+    Trial,
+    example_maps,
+    method_options,
+    run_paper,
+    tabulate,
+)
+
+PAPER = load_scenario("paper")
+
+
+def report(error):
+    """A report whose three errors are error, 2 error and 3 error."""
+    return Report(error, 5.0, 2.0 * error, 3.0 * error, mapped=1, not_ellipsoids=0)
+
+
+def trial(seed, *errors):
+    """One outcome per error; None is a failure. Relative positions halve the error."""
+    return Trial(
+        seed,
+        odometry_rmse_pos=10.0 + seed,
+        outcomes={
+            "monocular": tuple(outcome(error) for error in errors),
+            "relative_position": tuple(outcome(error and error / 2.0) for error in errors),
+        },
+    )
+
+
+def outcome(error):
+    return Outcome(None, 9.0, "ValueError: no") if error is None else Outcome(report(error), 1.0)
+
+
+def with_sigmas(monkeypatch, *sigmas):
+    monkeypatch.setattr(experiment, "ALGEBRAIC_SIGMAS", sigmas)
+
+
+def test_table_by_hand():
+    table = tabulate([trial(0, 1.0), trial(1, 2.0), trial(2, 6.0)], PAPER, "dqslam")
+    assert table.as_dict() == {
+        "trials": 3,
+        "seed": 0,
+        "objects": "cubes",
+        "method": "dqslam",
+        "odometry": {"rmse_pos": {"avg": 11.0, "med": 11.0, "max": 12.0}},
+        "monocular": {
+            "rmse_pos": {"avg": 3.0, "med": 2.0, "max": 6.0},
+            "rmse_landmark": {"avg": 6.0, "med": 4.0, "max": 12.0},
+            "rmse_volume": {"avg": 9.0, "med": 6.0, "max": 18.0},
+            "failures": 0,
+            "seconds_per_trial": {"med": 1.0},
+        },
+        "relative_position": {
+            "rmse_pos": {"avg": 1.5, "med": 1.0, "max": 3.0},
+            "rmse_landmark": {"avg": 3.0, "med": 2.0, "max": 6.0},
+            "rmse_volume": {"avg": 4.5, "med": 3.0, "max": 9.0},
+            "failures": 0,
+            "seconds_per_trial": {"med": 1.0},
+        },
+    }
+
+
+def test_failed_trials_are_counted_and_named():
+    table = tabulate([trial(4, 1.0), trial(5, None), trial(6, 3.0)], PAPER, "dqslam")
+    row = table.best("monocular")
+    assert row.failures == {5: "ValueError: no"}
+    assert row.metrics["rmse_pos"] == Statistics(avg=2.0, med=2.0, max=3.0)
+    assert table.as_dict()["monocular"]["failures"] == 1
+    assert table.as_dict()["trials"] == 3
+
+
+def test_json_has_null_where_no_trial_succeeded(tmp_path):
+    path = tmp_path / "deep" / "table.json"
+    tabulate([trial(0, None)], PAPER, "dqslam").save(path)
+    table = json.loads(path.read_text())
+    assert table["monocular"]["rmse_pos"] == {"avg": None, "med": None, "max": None}
+    assert table["monocular"]["failures"] == 1
+    assert [file.name for file in path.parent.iterdir()] == ["table.json"]
+
+
+def test_the_scan_keeps_every_weight_and_the_best_is_used(monkeypatch):
+    with_sigmas(monkeypatch, 1.0, 10.0, 100.0)
+    table = tabulate([trial(0, 4.0, 2.0, 3.0), trial(1, 4.0, 4.0, 5.0)], PAPER, "paper")
+    assert table.best("monocular").algebraic_sigma == 10.0
+    written = table.as_dict()
+    assert written["monocular"]["rmse_pos"]["avg"] == 3.0
+    assert written["scan"]["monocular"][1] == {
+        "algebraic_sigma": 10.0,
+        "rmse_pos": {"avg": 3.0, "med": 3.0, "max": 4.0},
+        "failures": 0,
+    }
+    assert [one["rmse_pos"]["avg"] for one in written["scan"]["relative_position"]] == [2, 1.5, 2]
+
+
+def test_a_weight_cannot_win_by_failing(monkeypatch):
+    with_sigmas(monkeypatch, 1.0, 10.0, 100.0)
+    table = tabulate([trial(0, 0.1, 4.0, None), trial(1, None, 5.0, None)], PAPER, "paper")
+    assert table.best("monocular").algebraic_sigma == 10.0
+
+
+def test_all_weights_may_fail(monkeypatch):
+    with_sigmas(monkeypatch, 1.0, 10.0)
+    table = tabulate([trial(0, None, None)], PAPER, "paper")
+    assert len(table.best("monocular").failures) == 1
+
+
+def test_the_papers_method_is_as_published():
+    options = method_options("paper", 1e9)
+    names = [options.residual.name, options.landmark_model.name, options.start.name]
+    assert names == ["ALGEBRAIC", "DUAL_QUADRIC", "IDENTITY"]
+    assert [options.schedule.name, options.loss.name, options.mode.name] == [
+        "BATCH",
+        "NONE",
+        "SLAM",
+    ]
+    assert options.algebraic_sigma == 1e9
+    np.testing.assert_allclose(np.diff(np.log10(ALGEBRAIC_SIGMAS)), 1.0)
+
+
+# --- real trials ---------------------------------------------------------------------------------
+
+
+def errors_of(table):
+    return {row: table.best(row).metrics for row in table.scan}
+
+
+def test_trials_beat_odometry_and_do_not_depend_on_the_processes():
+    seen = []
+    here = run_paper(
+        PAPER, trials=2, seed=6, method="dqslam", progress=lambda *step: seen.append(step)
+    )
+    assert seen == [(1, 2), (2, 2)]
+    assert here.seeds == (6, 7)
+    assert here.best("monocular").metrics["rmse_pos"].max < 0.2 * here.odometry.avg
+    assert not here.best("relative_position").failures
+    apart = run_paper(PAPER, trials=2, seed=6, method="dqslam", jobs=2)
+    assert errors_of(apart) == errors_of(here)
+    assert apart.odometry == here.odometry
+
+
+def test_the_papers_method_depends_on_its_weight(monkeypatch):
+    with_sigmas(monkeypatch, 1e10, 1e15)
+    table = run_paper(PAPER, trials=1, seed=6, method="paper")
+    good, ignored = (row.metrics["rmse_pos"].avg for row in table.scan["monocular"])
+    assert good < 0.5 * table.odometry.avg
+    assert ignored == pytest.approx(table.odometry.avg, rel=1e-3)  # boxes do not count any more
+
+
+def test_a_trial_that_raises_does_not_stop_the_others(monkeypatch):
+    real_solve, calls = experiment.solve, []
+
+    def solve_or_raise(graph, options):
+        calls.append(graph)
+        if len(calls) == 1:
+            raise RuntimeError("the solver\ngave up")
+        return real_solve(graph, options)
+
+    monkeypatch.setattr(experiment, "solve", solve_or_raise)
+    table = run_paper(PAPER, trials=1, seed=6, method="dqslam")
+    assert table.best("monocular").failures == {6: "RuntimeError: the solver\ngave up"}
+    assert table.best("relative_position").failures == {}
+    assert example_maps(PAPER, table, 6) == []  # maps are monocular
+
+
+def test_an_error_while_processes_run_stops_them():
+    def stop(done, trials):
+        raise RuntimeError(f"after {done} of {trials}")
+
+    with pytest.raises(RuntimeError, match="after 1 of 3"):
+        run_paper(PAPER, trials=3, seed=0, method="dqslam", jobs=2, progress=stop)
+    assert not multiprocessing.active_children()
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"trials": 0}, "trials: expected 1 or more, got 0"),
+        ({"seed": -1}, "seed: expected 0 or more, got -1"),
+        ({"jobs": 0}, "jobs: expected 1 or more, got 0"),
+    ],
+)
+def test_bad_settings_are_refused(settings, message):
+    with pytest.raises(ValueError, match=message):
+        run_paper(PAPER, **{"trials": 1, "seed": 0, "method": "dqslam"} | settings)
