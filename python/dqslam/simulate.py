@@ -59,7 +59,7 @@ def simulate(scenario: Scenario, *, seed: int) -> tuple[Recording, Truth]:
     position_noise = for_positions.normal(0.0, sigma, size=in_robot.shape)
     recording = Recording(
         camera=camera,
-        timestamps=scenario.path.period_s * np.arange(len(poses)),
+        timestamps=np.arange(len(poses), dtype=np.float64) * scenario.path.period_s,
         odometry=_measure_odometry(scenario, poses[0], relative, is_turn, for_odometry),
         detections=detections,
         positions=RelativePositions(

@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Sequence
+from typing import Any
 
 import typer
 
@@ -21,7 +22,7 @@ app.command()(run)
 _INTERRUPTED = 130
 _BAD_INPUT = 2
 # UsageError has no public name in typer; it is what BadParameter derives from.
-_UsageError = typer.BadParameter.__mro__[1]
+_UsageError: Any = typer.BadParameter.__mro__[1]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
