@@ -70,8 +70,8 @@ def build_graph(
     Raises
     ------
     ValueError
-        When a box has no object id, a relative position belongs to an object without boxes, or the
-        core refuses the problem.
+        When there are no boxes, one has no object id, a relative position belongs to an object
+        without boxes, or the core refuses the problem.
     """
     box_noise = BoxNoise() if box_noise is None else box_noise
     size_prior = SizePrior() if size_prior is None else size_prior
@@ -132,6 +132,8 @@ def solve(
 
 def _objects(detections: Detections) -> tuple[Ints, Ints, Ints]:
     """Return the object ids (o,), the row of each box's object (b,), and boxes per object (o,)."""
+    if not len(detections):
+        raise ValueError("detections: there are no boxes")
     unknown = detections.object_id < 0
     reject_rows("detections.object_id", unknown, "the box belongs to no object yet")
     object_ids, box_object, observations = np.unique(

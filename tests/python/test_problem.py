@@ -97,6 +97,10 @@ def without_id():
     return recording(detections=replace(recording().detections, object_id=[30, -1, 30]))
 
 
+def without_boxes():
+    return recording(detections=Detections([], [], [], [], []), positions=None)
+
+
 def position_without_box():
     return recording(positions=replace(recording().positions, object_id=[31]))
 
@@ -105,6 +109,7 @@ def position_without_box():
     ("make", "settings", "message"),
     [
         (without_id, {}, r"detections\.object_id row 1: the box belongs to no object yet"),
+        (without_boxes, {}, "detections: there are no boxes"),
         (position_without_box, {}, r"positions\.object_id row 0: the object has no box: 31"),
         (recording, {"box_noise": BoxNoise(pixels=0.0)}, "box noise: expected positive, finite"),
         (recording, {"box_noise": BoxNoise(pixels=np.nan)}, "box noise: expected positive, finite"),
