@@ -75,6 +75,16 @@ def test_distorted_boxes_are_undistorted(files, orbit):
     np.testing.assert_allclose(left, original[:, 0], atol=0.1)
 
 
+def test_a_box_where_the_lens_has_no_inverse_is_named(files, orbit):
+    edit(files[0], lambda lines: [lines[0][:-1] + ', "distortion": [-0.9, 0, 0, 0]}'])
+    times = orbit.times.tolist()
+    corners = (300, 310, 0)
+    rows = [f"{i},{times[i]!r},{u},0,{u + 2},2,0.9,1,cup,55" for i, u in enumerate(corners)]
+    add_rows(files[2], *rows)
+    with pytest.raises(FileError, match=r"boxes\.csv:164: the distortion in .*json has no"):
+        load_recording(*files)
+
+
 def test_every_dropped_box_is_counted(files, orbit):
     t = orbit.times.tolist()
     add_rows(

@@ -28,7 +28,7 @@ def run(
     ] = "slam",
     perturb_odometry: Annotated[
         str | None,
-        typer.Option(metavar="NOISE", help=f'Add noise to every step [m, rad]: "{NOISE}".'),
+        typer.Option(metavar="NOISE", help=f'Add noise to every step (m, rad): "{NOISE}".'),
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of that noise.")] = 0,
     odometry_noise: Annotated[
@@ -122,8 +122,9 @@ def _show(report: dict[str, Any], out: Path) -> None:
         f"{solver['rejected_steps']} rejected, {solver['seconds']:.2f} s)",
         markup=False,
         highlight=False,
+        soft_wrap=True,
     )
-    console.print(f"wrote {out}", markup=False)
+    console.print(f"wrote {out}", markup=False, highlight=False, soft_wrap=True)
 
 
 def _overview(report: dict[str, Any]) -> "Table":

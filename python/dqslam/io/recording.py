@@ -115,7 +115,7 @@ def load_recording(
         ),
         detections=Detections(
             pose=pose[rows],
-            box=lens.undistort_boxes(table.box[rows]),
+            box=_undistorted(lens, camera, table, rows),
             score=table.score[rows],
             class_id=table.class_id[rows],
             object_id=object_id[rows],
@@ -134,6 +134,22 @@ def nearest_pose(
     nearer_before = times - pose_times[after - 1] <= pose_times[after] - times
     pose = (after - nearer_before).astype(np.int64)
     return pose, np.abs(pose_times[pose] - times)
+
+
+def _undistorted(
+    lens: _core.Camera, camera: str | Path, table: DetectionTable, rows: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """Undistort boxes (m, 4), and name the line of one for which the lens has no inverse."""
+    try:
+        return lens.undistort_boxes(table.box[rows])
+    except ValueError:
+        for row in rows:
+            try:
+                lens.undistort_boxes(table.box[row : row + 1])
+            except ValueError:
+                message = f"the distortion in {camera} has no inverse at this box"
+                raise FileError(table.path, message, int(table.line[row])) from None
+        raise
 
 
 def _object_ids(table: DetectionTable, ids: Ids) -> NDArray[np.int64]:
