@@ -78,8 +78,8 @@ def test_distorted_boxes_are_undistorted(files, orbit):
 def test_a_box_where_the_lens_has_no_inverse_is_named(files, orbit):
     edit(files[0], lambda lines: [lines[0][:-1] + ', "distortion": [-0.9, 0, 0, 0]}'])
     times = orbit.times.tolist()
-    corners = (300, 310, 0)
-    rows = [f"{i},{times[i]!r},{u},0,{u + 2},2,0.9,1,cup,55" for i, u in enumerate(corners)]
+    places = ("300,238,302,240", "310,238,312,240", "0,0,2,2")
+    rows = [f"{i},{times[i]!r},{place},0.9,1,cup,55" for i, place in enumerate(places)]
     add_rows(files[2], *rows)
     with pytest.raises(FileError, match=r"boxes\.csv:164: the distortion in .*json has no"):
         load_recording(*files)
