@@ -126,8 +126,8 @@ def test_same_seed_same_files(files):
         (("--perturb-odometry", "0.02,0.01"), 'is not like "translation='),
         (("--perturb-odometry", "translation=0.02"), 'is not like "translation='),
         (("--perturb-odometry", "translation=a,rotation=1"), 'is not like "translation='),
-        (("--odometry-noise", "translation=0,rotation=1"), "translation is 0, not positive"),
-        (("--odometry-noise", "translation=1,rotation=nan"), "rotation is nan, not positive"),
+        (("--odometry-noise", "translation=0,rotation=1"), "translation is 0, not between"),
+        (("--odometry-noise", "translation=1,rotation=nan"), "rotation is nan, not between"),
         (("--seed", "-1"), "'--seed'"),
     ],
 )

@@ -52,6 +52,7 @@ def test_distortion_in_all_its_spellings(tmp_path, changes, distortion):
         ({"fy": -501.0}, r":3: fy is -501, not positive"),
         ({"width": -640}, r":6: width is -640, not positive"),
         ({"height": 480.5}, r":7: height is 480.5, not a whole number"),
+        ({"width": 10**12}, r":6: width is 1e\+12, not a whole number of pixels up to 1e6"),
         ({"cx": float("nan")}, r":4: cx is nan, not finite"),
         ({"cy": float("-inf")}, r":5: cy is -inf, not finite"),
         ({"fx": "500"}, r":2: fx is '500', not a number"),

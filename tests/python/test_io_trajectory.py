@@ -50,6 +50,7 @@ def test_rounded_quaternions_become_unit(tmp_path):
         (["5 1 2 3 0 0 0 1", "4 1 2 3 0 0 0 1"], r":2: time 4\.0 goes back from 5\.0"),
         ([GOOD, "1 1 2 3 0 0 0 0"], r":2: quaternion has length 0, not 1"),
         ([GOOD, "1 1 2 3 1 0 0 1"], r":2: quaternion has length 1\.41421, not 1"),
+        ([GOOD, "1 1 -1e9 3 0 0 0 1"], r":2: position is further than 1e\+08 m from the origin"),
         (["# nothing"], r"traj\.txt: holds nothing but comments"),
         ([""], r"traj\.txt: is empty"),
     ],

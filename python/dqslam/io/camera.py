@@ -21,6 +21,7 @@ from dqslam.io.files import FileError, read_text
 INTRINSICS = ("fx", "fy", "cx", "cy", "width", "height")
 DISTORTION = ("k1", "k2", "p1", "p2", "k3")
 DISTORTION_LISTS = ("distortion", "dist_k1k2p1p2k3")
+LARGEST_IMAGE = 1_000_000
 # Reading these as pinhole with radial and tangential distortion would be wrong without a sign.
 OTHER_MODELS = ("fisheye", "equidistant", "kannala", "omni", "double_sphere", "rational", "fov")
 
@@ -41,8 +42,8 @@ def read_camera(path: str | Path) -> _core.Camera:
         if values[key] <= 0:
             raise FileError(path, f"{key} is {values[key]:g}, not positive", _line_of(text, key))
     for key in ("width", "height"):
-        if values[key] != math.floor(values[key]):
-            message = f"{key} is {values[key]:g}, not a whole number of pixels"
+        if values[key] != math.floor(values[key]) or values[key] > LARGEST_IMAGE:
+            message = f"{key} is {values[key]:g}, not a whole number of pixels up to 1e6"
             raise FileError(path, message, _line_of(text, key))
     return _core.Camera(
         values["fx"],

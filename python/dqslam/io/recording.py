@@ -18,6 +18,8 @@ from dqslam.recording import Detections, Odometry, Recording
 
 # Two boxes do not tell an object's distance from its size when the path is noisy.
 FEWEST_BOXES = 3
+# Odometry outside of this is exact or worthless, and squares badly.
+SIGMAS = (1e-9, 1e6)
 
 Ids = Literal["track_id", "class_id"]
 
@@ -32,8 +34,11 @@ class OdometryNoise:
     def __post_init__(self) -> None:
         """Refuse what is no standard deviation."""
         for name, sigma in (("translation", self.translation_m), ("rotation", self.rotation_rad)):
-            if not (np.isfinite(sigma) and sigma > 0):
-                raise ValueError(f"odometry noise: {name} is {sigma:g}, not positive")
+            if not SIGMAS[0] <= sigma <= SIGMAS[1]:
+                raise ValueError(
+                    f"odometry noise: {name} is {sigma:g}, not between "
+                    f"{SIGMAS[0]:g} and {SIGMAS[1]:g}"
+                )
 
     def covariance(self, steps: int) -> NDArray[np.float64]:
         """Repeat the covariance of a step, translation first: shape (steps, 6, 6)."""

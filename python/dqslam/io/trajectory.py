@@ -18,6 +18,9 @@ FIELDS = ("t", "tx", "ty", "tz", "qx", "qy", "qz", "qw")
 # Files round quaternions to 4 digits, which costs up to 1e-4 of the norm; more is a mistake.
 NORM_TOLERANCE = 1e-3
 
+# Beyond any place on Earth, in any frame: numbers of another unit, or of another column.
+LARGEST_COORDINATE = 1e8
+
 
 class Trajectory(NamedTuple):
     """A path: ``timestamps`` (n,) s, increasing, and ``world_from_camera`` (n, 7) m, x y z w."""
@@ -44,6 +47,10 @@ def read_trajectory(path: str | Path, *, repeated_times: bool = False) -> Trajec
         keep = np.concatenate([[True], table[1:, 0] != table[:-1, 0]])
         table, line_numbers = table[keep], line_numbers[keep]
     _check_times(path, table[:, 0], line_numbers)
+    far = np.flatnonzero(np.abs(table[:, 1:4]).max(axis=1) > LARGEST_COORDINATE)
+    if far.size:
+        message = f"position is further than {LARGEST_COORDINATE:g} m from the origin"
+        raise FileError(path, message, int(line_numbers[far[0]]))
     return Trajectory(table[:, 0], _normalised(path, table[:, 1:], line_numbers))
 
 
