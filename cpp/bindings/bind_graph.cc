@@ -1,4 +1,5 @@
 #include <pybind11/eigen.h>
+#include <pybind11/stl.h>
 
 #include "bindings.h"
 #include "dqslam/graph.h"
@@ -13,15 +14,17 @@ void BindGraph(py::module_& m) {
       .def(py::init([](PoseModel pose_model, const Camera& camera, RowMatrix initial_poses,
                        IndexVector odometry_from, IndexVector odometry_to, RowMatrix odometry,
                        RowMatrix odometry_covariance, IndexVector box_pose, IndexVector box_object,
-                       RowMatrix boxes, RowMatrix box_covariance, IndexVector position_pose,
+                       RowMatrix boxes, RowMatrix box_covariance, std::optional<BoolTable> box_truncated,
+                       IndexVector position_pose,
                        IndexVector position_object, RowMatrix positions,
                        RowMatrix position_covariance, Eigen::VectorXd log_size_mean,
                        Eigen::VectorXd log_size_sigma) {
+             const BoolTable none = BoolTable::Constant(boxes.rows(), kBoxSize, false);
              Graph graph{pose_model,
                          camera,
                          std::move(initial_poses),
                          {odometry_from, odometry_to, odometry, odometry_covariance},
-                         {box_pose, box_object, boxes, box_covariance},
+                         {box_pose, box_object, boxes, box_covariance, box_truncated.value_or(none)},
                          {position_pose, position_object, positions, position_covariance},
                          {log_size_mean, log_size_sigma}};
              Validate(graph, /*poses_known=*/true);  // solve() asks for odometry where it needs it
@@ -29,12 +32,12 @@ void BindGraph(py::module_& m) {
            }),
            "pose_model"_a, "camera"_a, py::kw_only(), "initial_poses"_a, "odometry_from"_a,
            "odometry_to"_a, "odometry"_a, "odometry_covariance"_a, "box_pose"_a, "box_object"_a,
-           "boxes"_a, "box_covariance"_a, "position_pose"_a = IndexVector(),
+           "boxes"_a, "box_covariance"_a, "box_truncated"_a = std::nullopt, "position_pose"_a = IndexVector(),
            "position_object"_a = IndexVector(), "positions"_a = RowMatrix(0, 3),
            "position_covariance"_a = RowMatrix(0, 9), "log_size_mean"_a, "log_size_sigma"_a,
            "Shapes, with d the size of a pose and k of its tangent: initial_poses (n, d); odometry "
            "(m, d), to_in_from, with covariance (m, k * k); boxes (b, 4) undistorted pixels with "
-           "covariance (b, 16); positions (p, 3) object_in_robot, metres, with covariance (p, 9); "
+           "covariance (b, 16) and box_truncated (b, 4), edges cut by the image border; positions (p, 3) object_in_robot, metres, with covariance (p, 9); "
            "log_size_mean and log_size_sigma (o,), of semi-axes in log metres.")
       .def_readonly("pose_model", &Graph::pose_model)
       .def_readonly("camera", &Graph::camera)
@@ -48,6 +51,7 @@ void BindGraph(py::module_& m) {
       .def_property_readonly("box_object", [](const Graph& g) { return g.boxes.object; })
       .def_property_readonly("boxes", [](const Graph& g) { return g.boxes.box; })
       .def_property_readonly("box_covariance", [](const Graph& g) { return g.boxes.covariance; })
+      .def_property_readonly("box_truncated", [](const Graph& g) { return g.boxes.truncated; })
       .def_property_readonly("position_pose", [](const Graph& g) { return g.positions.pose; })
       .def_property_readonly("position_object", [](const Graph& g) { return g.positions.object; })
       .def_property_readonly("positions",

@@ -31,8 +31,9 @@ class Assembler {
     AddPoses();
     AddOdometry();
     std::vector<bool> takes_part(graph_.num_objects(), false);
-    for (const int row : stage_.boxes) {
-      AddBox(row);
+    for (size_t i = 0; i < stage_.boxes.size(); ++i) {
+      const int row = stage_.boxes[i];
+      AddBox(row, stage_.weights.empty() ? 1.0 : stage_.weights[i]);
       takes_part[graph_.boxes.object[row]] = true;
     }
     AddPositions(takes_part);
@@ -66,9 +67,12 @@ class Assembler {
     }
   }
 
-  void AddBox(int row) {
+  void AddBox(int row, double weight) {
+    if (weight == 0) return;
     const int pose = graph_.boxes.pose[row], object = graph_.boxes.object[row];
-    problem_.AddResidualBlock(MakeBoxCost(row), MakeLoss(), PoseAt(pose), LandmarkAt(object));
+    ceres::LossFunction* loss = MakeLoss();
+    if (weight != 1) loss = new ceres::ScaledLoss(loss, weight, ceres::TAKE_OWNERSHIP);
+    problem_.AddResidualBlock(MakeBoxCost(row), loss, PoseAt(pose), LandmarkAt(object));
   }
 
   ceres::CostFunction* MakeBoxCost(int row) {
@@ -85,15 +89,17 @@ class Assembler {
     const Surface<double> surface =
         ToCamera(LocateCamera<Pose>(PoseAt(graph_.boxes.pose[row]), prepared_.mount),
                  Landmark::Unpack(LandmarkAt(graph_.boxes.object[row])));
+    const EdgeFlags one_sided = OneSidedEdges(prepared_, row, surface);
     Eigen::Vector4d predicted;
     if (residual == Residual::kBox && ProjectToBox(surface, graph_.camera, &predicted)) {
-      return BoxCost<Pose, Landmark>::Create(graph_.camera, prepared_.mount, observed, weight);
+      return BoxCost<Pose, Landmark>::Create(graph_.camera, prepared_.mount, observed, weight,
+                                             one_sided);
     }
     // Never closer than the object is thick, so that an object behind the camera still has a scale.
     const double thickness = std::sqrt(std::max(surface.shape(2, 2), 1e-12));
     const double depth = std::max(surface.center.z(), 1.5 * thickness);
     return TangentCost<Pose, Landmark>::Create(graph_.camera, prepared_.mount, observed, weight,
-                                               depth);
+                                               one_sided, depth);
   }
 
   ceres::LossFunction* MakeLoss() const {

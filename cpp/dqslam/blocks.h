@@ -34,5 +34,8 @@ using Vector9d = Eigen::Matrix<double, 9, 1>;
 /// A table: one row per item.
 using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 using IndexVector = Eigen::VectorXi;
+using BoolTable = Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+/// One flag for each edge of a box, in the order of its coordinates.
+using EdgeFlags = Eigen::Array<bool, kBoxSize, 1>;
 
 }  // namespace dqslam

@@ -18,6 +18,10 @@ struct Camera {
   Eigen::Matrix<double, 7, 1> robot_from_camera =
       (Eigen::Matrix<double, 7, 1>() << 0, 0, 0, 0, 0, 0, 1).finished();
 
+  /// Whether a pixel lies in the image, see blocks.h.
+  bool Shows(double u, double v) const {
+    return u >= -0.5 && v >= -0.5 && u <= width - 0.5 && v <= height - 0.5;
+  }
   bool HasDistortion() const { return !distortion.isZero(0.0); }
 
   /// Throws std::invalid_argument unless focal lengths and sizes are positive, all is finite and

@@ -7,6 +7,24 @@
 
 namespace dqslam {
 
+Eigen::Matrix<double, 4, 2> TouchingPoints(const Surface<double>& in_camera, const Camera& camera,
+                                           const Eigen::Vector4d& box) {
+  const Eigen::Vector3d& p = in_camera.center;
+  const Eigen::Matrix3d conic = p * p.transpose() - in_camera.shape;  // dual, normalised
+  const double focal[2] = {camera.fx, camera.fy}, principal[2] = {camera.cx, camera.cy};
+  Eigen::Matrix<double, 4, 2> points;
+  for (int edge = 0; edge < kBoxSize; ++edge) {
+    const int axis = edge % 2;
+    Eigen::Vector3d line = Eigen::Vector3d::Zero();
+    line[axis] = 1;
+    line.z() = -(box[edge] - principal[axis]) / focal[axis];
+    const Eigen::Vector3d pole = conic * line;
+    points.row(edge) << camera.fx * pole.x() / pole.z() + camera.cx,
+        camera.fy * pole.y() / pole.z() + camera.cy;
+  }
+  return points;
+}
+
 Vector9d DualQuadricFromSurface(const Surface<double>& surface) {
   const Eigen::Vector3d& c = surface.center;
   const Eigen::Matrix3d A = c * c.transpose() - surface.shape;

@@ -123,6 +123,21 @@ bool TangentDistances(const Surface<T>& in_camera, const Camera& camera,
   return true;
 }
 
+/// Where the outline touches its bounding box at each edge [px], (u, v) one a row: the pole of the
+/// edge's line.  The box is that of ProjectToBox.
+Eigen::Matrix<double, 4, 2> TouchingPoints(const Surface<double>& in_camera, const Camera& camera,
+                                           const Eigen::Vector4d& box);
+
+/// An edge that the image border cut says only that the object goes on beyond: its error counts
+/// where the prediction ends inside, and is zero otherwise.  Errors are predicted - observed.
+template <typename T>
+void IgnoreBeyond(const EdgeFlags& one_sided, Vector4<T>* box_error) {
+  for (int edge = 0; edge < kBoxSize; ++edge) {
+    const double outward = edge < 2 ? -1 : 1;
+    if (one_sided[edge] && T(outward) * (*box_error)[edge] > T(0)) (*box_error)[edge] = T(0);
+  }
+}
+
 /// Dual quadric [q1 .. q9] of a surface in the same frame.
 Vector9d DualQuadricFromSurface(const Surface<double>& surface);
 

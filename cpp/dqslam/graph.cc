@@ -93,6 +93,11 @@ void ValidateBoxes(const Graph& graph) {
   CheckShape("boxes", boxes.box, rows, kBoxSize);
   CheckShape("box_covariance", boxes.covariance, rows, kBoxSize * kBoxSize);
   CheckCovariance<kBoxSize>("box_covariance", boxes.covariance);
+  if (boxes.truncated.rows() != rows || (rows > 0 && boxes.truncated.cols() != kBoxSize)) {
+    throw std::invalid_argument("box_truncated has " + std::to_string(boxes.truncated.rows()) +
+                                " rows of " + std::to_string(boxes.truncated.cols()) +
+                                ", expected " + std::to_string(rows) + " of 4");
+  }
   std::vector<bool> seen(graph.num_objects(), false);
   for (int row = 0; row < rows; ++row) {
     if (boxes.box(row, 0) >= boxes.box(row, 2) || boxes.box(row, 1) >= boxes.box(row, 3)) {

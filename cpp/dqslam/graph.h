@@ -23,6 +23,7 @@ struct BoxTable {
   IndexVector pose, object;
   RowMatrix box;         ///< (n, 4) undistorted pixels
   RowMatrix covariance;  ///< (n, 16) pixels^2
+  BoolTable truncated;   ///< (n, 4) edges that the image border cut: the object goes on beyond
   int size() const { return static_cast<int>(pose.size()); }
 };
 

@@ -16,7 +16,8 @@ std::vector<View> ViewsOf(const PreparedGraph& prepared, const State& state,
   std::vector<View> views;
   for (const int row : boxes) {
     views.push_back({LocateCamera(prepared, state, prepared.graph.boxes.pose[row]),
-                     prepared.graph.boxes.box.row(row), prepared.box_sqrt_information[row]});
+                     prepared.graph.boxes.box.row(row), prepared.box_sqrt_information[row],
+                     prepared.graph.boxes.truncated.row(row)});
   }
   return views;
 }

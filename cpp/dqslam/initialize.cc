@@ -58,10 +58,11 @@ SvdFit FitSvd(const Camera& camera, const std::vector<View>& views) {
   double scale = 0;
   for (const View& view : views) scale += (view.camera.position - origin).norm() / views.size();
 
-  Eigen::MatrixXd A(4 * views.size(), 10);
+  Eigen::MatrixXd A = Eigen::MatrixXd::Zero(std::max<size_t>(4 * views.size(), 10), 10);
   Eigen::Index row = 0;
   for (const View& view : views) {
     for (int edge = 0; edge < 4; ++edge, ++row) {
+      if (view.truncated[edge]) continue;
       const Vector3d n =
           (view.camera.camera_from_world.transpose() * EdgeNormal(camera, view.box, edge))
               .normalized();
@@ -97,7 +98,14 @@ Vector9d BackProject(const Camera& camera, const std::vector<View>& views,
   for (const View& view : views) {
     const double width = (view.box[2] - view.box[0]) / camera.fx;
     const double height = (view.box[3] - view.box[1]) / camera.fy;
-    const double depth = 2 * radius / std::sqrt(width * height);
+    // A side that the border cut is too short: trust the other one, or the longer of two.
+    const bool width_cut = view.truncated[0] || view.truncated[2];
+    const bool height_cut = view.truncated[1] || view.truncated[3];
+    const double side = width_cut && height_cut ? std::max(width, height)
+                        : width_cut             ? height
+                        : height_cut            ? width
+                                                : std::sqrt(width * height);
+    const double depth = 2 * radius / side;
     // Never inside the sphere: a box as wide as the image would say so.
     const Vector3d in_world =
         view.camera.position + std::max(depth, 1.5 * radius) * RayInWorld(camera, view);
@@ -126,7 +134,8 @@ Vector9d FitSphere(const Camera& camera, const std::vector<View>& views, const S
       Vector4d offsets;
       for (int edge = 0; edge < 4; ++edge) {
         const Vector3d normal = EdgeNormal(camera, view.box, edge);
-        const double weight = (edge % 2 == 0 ? camera.fx : camera.fy) / depth[i];
+        const double focal = edge % 2 == 0 ? camera.fx : camera.fy;
+        const double weight = view.truncated[edge] ? 0 : focal / depth[i];
         rows.row(edge) << weight * (view.camera.camera_from_world.transpose() * normal).transpose(),
             weight * normal.norm();
         offsets[edge] = rows.row(edge).head<3>().dot(view.camera.position);

@@ -12,6 +12,7 @@ struct View {
   CameraInWorld<double> camera;
   Eigen::Vector4d box;               ///< pixels
   Eigen::Matrix4d sqrt_information;  ///< 1 / pixels
+  EdgeFlags truncated;               ///< edges that say nothing about where the object ends
 };
 
 /// Prior on the object's size: semi-axes, log metres.
@@ -29,7 +30,7 @@ struct SvdFit {
 
 /// Smallest right singular vector of the planes' equations, normalised: planes of unit normal in a
 /// frame that is centred on the object and scaled by its distance.  Throws std::invalid_argument
-/// with fewer than 3 views.
+/// with fewer than 3 views.  Truncated edges take no part.
 SvdFit FitSvd(const Camera& camera, const std::vector<View>& views);
 
 /// [S&M17]: (1, 0, 0, 0, 1, 0, 0, 1, 0), that is Q* = I.  Its shape is -I: no ellipsoid.

@@ -106,10 +106,11 @@ Eigen::VectorXd BoxCosts(const PreparedGraph& prepared, const SolveOptions& opti
       const double* pose = state.poses.row(graph.boxes.pose[row]).data();
       const double* parameters = state.landmarks.row(graph.boxes.object[row]).data();
       Eigen::Vector4d predicted;
-      const bool defined = ProjectToBox(
-          ToCamera(LocateCamera<Pose>(pose, prepared.mount), Landmark::Unpack(parameters)),
-          graph.camera, &predicted);
-      const Eigen::Vector4d error = predicted - graph.boxes.box.row(row).transpose();
+      const Surface<double> surface =
+          ToCamera(LocateCamera<Pose>(pose, prepared.mount), Landmark::Unpack(parameters));
+      const bool defined = ProjectToBox(surface, graph.camera, &predicted);
+      Eigen::Vector4d error = predicted - graph.boxes.box.row(row).transpose();
+      IgnoreBeyond(OneSidedEdges(prepared, row, surface), &error);
       costs[row] = defined ? 0.5 * (prepared.box_sqrt_information[row] * error).squaredNorm()
                            : std::numeric_limits<double>::infinity();
     }

@@ -23,6 +23,7 @@ struct Stage {
   int first_free_pose = 1;  ///< poses before it are constant
   int end_pose = 0;         ///< poses from it on take no part
   std::vector<int> boxes;   ///< rows that take part; their objects do too
+  std::vector<double> weights;  ///< of these boxes, in [0, 1]; empty: all 1
   Residual residual = Residual::kTangent;  ///< not kTangentThenBox
   Minimizer minimizer = Minimizer::kDogleg;
   int max_iterations = 100;

@@ -51,6 +51,19 @@ PreparedGraph::PreparedGraph(const Graph& graph, bool poses_known)
   }
 }
 
+EdgeFlags OneSidedEdges(const PreparedGraph& prepared, int box, const Surface<double>& in_camera) {
+  EdgeFlags one_sided = prepared.graph.boxes.truncated.row(box);
+  if (!one_sided.any()) return one_sided;
+  const Camera& camera = prepared.graph.camera;
+  Eigen::Vector4d predicted;
+  if (!ProjectToBox(in_camera, camera, &predicted)) return one_sided;
+  const Eigen::Matrix<double, 4, 2> points = TouchingPoints(in_camera, camera, predicted);
+  for (int edge = 0; edge < kBoxSize; ++edge) {
+    one_sided[edge] = one_sided[edge] || !camera.Shows(points(edge, 0), points(edge, 1));
+  }
+  return one_sided;
+}
+
 CameraInWorld<double> LocateCamera(const PreparedGraph& prepared, const State& state, int pose) {
   const double* world_from_robot = state.poses.row(pose).data();
   return prepared.graph.pose_model == PoseModel::kSe2

@@ -2,6 +2,7 @@
 // [S&M17] sec. 3.3, with the exact bounding box of the outline.
 //
 // Blocks: world_from_robot [d], landmark [9].  Residual: [4], in sigmas.
+// Edges flagged one_sided count only where the prediction ends inside the observed edge.
 // Returns false, so that Ceres rejects the step, unless the object is strictly in front.
 #pragma once
 
@@ -17,6 +18,7 @@ struct BoxCost : AutoDiffCost<BoxCost<Pose, Landmark>, kBoxSize, Pose::kSize, kL
   Mount mount;
   Eigen::Vector4d observed;          ///< pixels
   Eigen::Matrix4d sqrt_information;  ///< 1 / pixels
+  EdgeFlags one_sided;
 
   template <typename T>
   bool operator()(const T* pose, const T* landmark, T* residual) const {
@@ -24,7 +26,9 @@ struct BoxCost : AutoDiffCost<BoxCost<Pose, Landmark>, kBoxSize, Pose::kSize, kL
     const Surface<T> surface =
         ToCamera(LocateCamera<Pose>(pose, mount), Landmark::Unpack(landmark));
     if (!ProjectToBox(surface, camera, &predicted)) return false;
-    Whiten<kBoxSize, T>(sqrt_information, predicted - observed.cast<T>(), residual);
+    Vector4<T> error = predicted - observed.cast<T>();
+    IgnoreBeyond(one_sided, &error);
+    Whiten(sqrt_information, error, residual);
     return true;
   }
 };

@@ -6,6 +6,7 @@
 //
 // Blocks: world_from_robot [d], landmark [9].  Residual: [4], in sigmas.
 // The scale focal / depth turns metres into pixels; `depth` is frozen while a stage runs.
+// Edges flagged one_sided count only where the object ends inside the box.
 // Affine in the centre and defined everywhere for ellipsoids: behind, beside and inside too.
 // Returns false where n^T S n is not positive (only a dual quadric that is no ellipsoid).
 #pragma once
@@ -23,7 +24,8 @@ struct TangentCost
   Mount mount;
   Eigen::Vector4d observed;          ///< pixels
   Eigen::Matrix4d sqrt_information;  ///< 1 / pixels
-  double depth;                      ///< metres
+  EdgeFlags one_sided;
+  double depth;  ///< metres
 
   template <typename T>
   bool operator()(const T* pose, const T* landmark, T* residual) const {
@@ -31,6 +33,9 @@ struct TangentCost
         ToCamera(LocateCamera<Pose>(pose, mount), Landmark::Unpack(landmark));
     Vector4<T> error;
     if (!TangentDistances(surface, camera, observed, depth, &error)) return false;
+    for (int edge = 0; edge < kBoxSize; ++edge) {
+      if (one_sided[edge] && error[edge] > T(0)) error[edge] = T(0);
+    }
     Whiten(sqrt_information, error, residual);
     return true;
   }
