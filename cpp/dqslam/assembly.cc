@@ -99,7 +99,7 @@ class Assembler {
     const double thickness = std::sqrt(std::max(surface.shape(2, 2), 1e-12));
     const double depth = std::max(surface.center.z(), 1.5 * thickness);
     return TangentCost<Pose, Landmark>::Create(graph_.camera, prepared_.mount, observed, weight,
-                                               one_sided, depth);
+                                               depth, one_sided);
   }
 
   ceres::LossFunction* MakeLoss() const {

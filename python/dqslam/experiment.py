@@ -32,7 +32,7 @@ METRICS = ("rmse_pos", "rmse_landmark", "rmse_volume")
 
 # The paper does not state the weight Lambda of its box residual. Every decade of its sigma, in
 # px^4 m^2, is tried from where boxes overrule odometry (worse than it) to where they do not count.
-ALGEBRAIC_SIGMAS = tuple(float(10.0**power) for power in range(5, 16))
+ALGEBRAIC_SIGMAS = tuple(float(10.0**power) for power in range(7, 15))
 
 # [S&M17] table 1, (avg, med) of each metric.
 PAPER_ODOMETRY = (5.31, 4.03)

@@ -18,7 +18,7 @@ struct BoxCost : AutoDiffCost<BoxCost<Pose, Landmark>, kBoxSize, Pose::kSize, kL
   Mount mount;
   Eigen::Vector4d observed;          ///< pixels
   Eigen::Matrix4d sqrt_information;  ///< 1 / pixels
-  EdgeFlags one_sided;
+  EdgeFlags one_sided = EdgeFlags::Constant(false);
 
   template <typename T>
   bool operator()(const T* pose, const T* landmark, T* residual) const {

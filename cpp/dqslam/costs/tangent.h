@@ -24,8 +24,8 @@ struct TangentCost
   Mount mount;
   Eigen::Vector4d observed;          ///< pixels
   Eigen::Matrix4d sqrt_information;  ///< 1 / pixels
-  EdgeFlags one_sided;
-  double depth;  ///< metres
+  double depth;                      ///< metres
+  EdgeFlags one_sided = EdgeFlags::Constant(false);
 
   template <typename T>
   bool operator()(const T* pose, const T* landmark, T* residual) const {
