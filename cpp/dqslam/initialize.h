@@ -12,7 +12,8 @@ struct View {
   CameraInWorld<double> camera;
   Eigen::Vector4d box;               ///< pixels
   Eigen::Matrix4d sqrt_information;  ///< 1 / pixels
-  EdgeFlags truncated;               ///< edges that say nothing about where the object ends
+  /// Edges that say nothing about where the object ends.
+  EdgeFlags truncated = EdgeFlags::Constant(false);
 };
 
 /// Prior on the object's size: semi-axes, log metres.
