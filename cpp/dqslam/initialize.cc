@@ -57,6 +57,8 @@ SvdFit FitSvd(const Camera& camera, const std::vector<View>& views) {
   const Vector3d origin = TriangulateMiddles(camera, views);
   double scale = 0;
   for (const View& view : views) scale += (view.camera.position - origin).norm() / views.size();
+  // Views from one place meet in the camera: no depth to scale by, and degenerate at any scale.
+  if (scale < 1e-9 * (1 + origin.norm())) scale = 1;
 
   Eigen::MatrixXd A = Eigen::MatrixXd::Zero(std::max<size_t>(4 * views.size(), 10), 10);
   Eigen::Index row = 0;
