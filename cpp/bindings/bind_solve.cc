@@ -57,6 +57,10 @@ void BindEnums(py::module_& m) {
       .value("NONE", Loss::kNone)
       .value("HUBER", Loss::kHuber)
       .value("CAUCHY", Loss::kCauchy)
+      .value("DCS", Loss::kDcs)
+      .value("SWITCHABLE", Loss::kSwitchable)
+      .value("GNC_TLS", Loss::kGncTls)
+      .value("GNC_GM", Loss::kGncGm)
       .finalize();
   py::native_enum<Minimizer>(m, "Minimizer", "enum.Enum", "The minimiser of the last stage.")
       .value("LEVENBERG_MARQUARDT", Minimizer::kLevenbergMarquardt)
@@ -78,7 +82,10 @@ void BindOptions(py::module_& m) {
       .def_readwrite("start", &SolveOptions::start)
       .def_readwrite("schedule", &SolveOptions::schedule)
       .def_readwrite("loss", &SolveOptions::loss)
-      .def_readwrite("loss_scale", &SolveOptions::loss_scale, "Sigmas of a whole box.")
+      .def_readwrite("loss_scale", &SolveOptions::loss_scale,
+                     "Of Huber and Cauchy, sigmas of a whole box.")
+      .def_readwrite("outlier_chi_square", &SolveOptions::outlier_chi_square,
+                     "Of the other losses: a box beyond it is an outlier (4 dof).")
       .def_readwrite("algebraic_sigma", &SolveOptions::algebraic_sigma,
                      "Of both algebraic residuals, in their own unit.")
       .def_readwrite("minimizer", &SolveOptions::minimizer, "Of the last stage.")
@@ -120,6 +127,7 @@ void BindSolution(py::module_& m) {
       .def_readonly("dual_quadrics", &Solution::dual_quadrics, "q1 .. q9, shape (o, 9).")
       .def_readonly("svd_singular_values", &Solution::svd_singular_values,
                     "Of each object's SVD start, shape (o, 10), descending; NaN where not used.")
+      .def_readonly("inliers", &Solution::inliers, "Boxes that fit their objects, shape (b,).")
       .def_readonly("summary", &Solution::summary);
 }
 

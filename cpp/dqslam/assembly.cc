@@ -5,6 +5,7 @@
 
 #include "dqslam/costs/algebraic.h"
 #include "dqslam/costs/box.h"
+#include "dqslam/costs/losses.h"
 #include "dqslam/costs/odometry.h"
 #include "dqslam/costs/relative_position.h"
 #include "dqslam/costs/size_prior.h"
@@ -70,11 +71,27 @@ class Assembler {
   void AddBox(int row, double weight) {
     if (weight == 0) return;
     const int pose = graph_.boxes.pose[row], object = graph_.boxes.object[row];
+    if (stage_.loss == Loss::kSwitchable) {
+      problem_.AddResidualBlock(MakeBoxCost<true>(row), nullptr, PoseAt(pose), LandmarkAt(object),
+                                &state_.switches[row]);
+      return;
+    }
     ceres::LossFunction* loss = MakeLoss();
     if (weight != 1) loss = new ceres::ScaledLoss(loss, weight, ceres::TAKE_OWNERSHIP);
-    problem_.AddResidualBlock(MakeBoxCost(row), loss, PoseAt(pose), LandmarkAt(object));
+    problem_.AddResidualBlock(MakeBoxCost<false>(row), loss, PoseAt(pose), LandmarkAt(object));
   }
 
+  template <bool kSwitched, typename BoxResidual, typename... Members>
+  ceres::CostFunction* Create(const Members&... members) {
+    if constexpr (kSwitched) {
+      return SwitchedCost<Pose, BoxResidual>::Create(BoxResidual{{}, members...},
+                                                     std::sqrt(options_.outlier_chi_square));
+    } else {
+      return BoxResidual::Create(members...);
+    }
+  }
+
+  template <bool kSwitched>
   ceres::CostFunction* MakeBoxCost(int row) {
     const Eigen::Vector4d observed = graph_.boxes.box.row(row);
     const Eigen::Matrix4d& weight = prepared_.box_sqrt_information[row];
@@ -82,7 +99,7 @@ class Assembler {
     if (residual == Residual::kAlgebraic || residual == Residual::kAlgebraicNormalized) {
       const Eigen::Matrix4d algebraic_weight =
           Eigen::Matrix4d::Identity() / options_.algebraic_sigma;
-      return AlgebraicCost<Pose, Landmark>::Create(
+      return Create<kSwitched, AlgebraicCost<Pose, Landmark>>(
           prepared_.mount, BoxLines(graph_.camera, observed), algebraic_weight,
           residual == Residual::kAlgebraicNormalized);
     }
@@ -92,24 +109,29 @@ class Assembler {
     const EdgeFlags one_sided = OneSidedEdges(prepared_, row, surface);
     Eigen::Vector4d predicted;
     if (residual == Residual::kBox && ProjectToBox(surface, graph_.camera, &predicted)) {
-      return BoxCost<Pose, Landmark>::Create(graph_.camera, prepared_.mount, observed, weight,
+      return Create<kSwitched, BoxCost<Pose, Landmark>>(graph_.camera, prepared_.mount, observed, weight,
                                              one_sided);
     }
     // Never closer than the object is thick, so that an object behind the camera still has a scale.
     const double thickness = std::sqrt(std::max(surface.shape(2, 2), 1e-12));
     const double depth = std::max(surface.center.z(), 1.5 * thickness);
-    return TangentCost<Pose, Landmark>::Create(graph_.camera, prepared_.mount, observed, weight,
+    return Create<kSwitched, TangentCost<Pose, Landmark>>(graph_.camera, prepared_.mount, observed, weight,
                                                depth, one_sided);
   }
 
   ceres::LossFunction* MakeLoss() const {
-    switch (options_.loss) {
-      case Loss::kNone:
-        return nullptr;
+    switch (stage_.loss) {
       case Loss::kHuber:
         return new ceres::HuberLoss(options_.loss_scale);
       case Loss::kCauchy:
         return new ceres::CauchyLoss(options_.loss_scale);
+      case Loss::kDcs:
+        return new DcsLoss(options_.outlier_chi_square);
+      case Loss::kNone:
+      case Loss::kSwitchable:
+      case Loss::kGncTls:
+      case Loss::kGncGm:
+        break;
     }
     return nullptr;
   }

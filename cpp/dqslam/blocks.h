@@ -35,6 +35,7 @@ using Vector9d = Eigen::Matrix<double, 9, 1>;
 using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 using IndexVector = Eigen::VectorXi;
 using BoolTable = Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+using Mask = Eigen::Array<bool, Eigen::Dynamic, 1>;
 /// One flag for each edge of a box, in the order of its coordinates.
 using EdgeFlags = Eigen::Array<bool, kBoxSize, 1>;
 

@@ -67,6 +67,7 @@ void Validate(const Graph& graph, bool poses_known);
 struct State {
   RowMatrix poses;      ///< (poses, d)
   RowMatrix landmarks;  ///< (objects, 9) in the landmark model of the solve
+  Eigen::VectorXd switches = {};  ///< (boxes) of switchable constraints: 1 believed, 0 not
 };
 
 struct Summary {

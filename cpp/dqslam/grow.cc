@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "dqslam/robust.h"
+
 namespace dqslam {
 namespace {
 
@@ -75,6 +77,7 @@ Summary Grow(const PreparedGraph& prepared, const SolveOptions& options, const M
     if (stage.boxes.empty()) continue;
     stage.residual = options.residual == Residual::kTangentThenBox ? Residual::kTangent
                                                                    : options.residual;
+    stage.loss = IsRobust(options.loss) ? Loss::kCauchy : Loss::kNone;
     stage.minimizer = Minimizer::kLevenbergMarquardt;
     stage.max_iterations = options.grow_iterations;
     stage.function_tolerance = options.grow_tolerance;

@@ -25,6 +25,7 @@ struct Stage {
   std::vector<int> boxes;   ///< rows that take part; their objects do too
   std::vector<double> weights;  ///< of these boxes, in [0, 1]; empty: all 1
   Residual residual = Residual::kTangent;  ///< not kTangentThenBox
+  Loss loss = Loss::kNone;                 ///< GNC: of the boxes' weights, not of this stage
   Minimizer minimizer = Minimizer::kDogleg;
   int max_iterations = 100;
   double function_tolerance = 1e-10;  ///< stop when |change of cost| / cost falls below

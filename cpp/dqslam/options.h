@@ -30,7 +30,16 @@ enum class Schedule {
   kGrow,   ///< a few poses at a time along the trajectory
 };
 
-enum class Loss { kNone, kHuber, kCauchy };
+/// Robust back ends, on whole boxes; odometry is always quadratic.
+enum class Loss {
+  kNone,
+  kHuber,
+  kCauchy,
+  kDcs,         ///< dynamic covariance scaling, Agarwal et al. 2013
+  kSwitchable,  ///< switchable constraints, Suenderhauf & Protzel 2012
+  kGncTls,      ///< graduated non-convexity, truncated least squares, Yang et al. 2020
+  kGncGm,       ///< graduated non-convexity, Geman-McClure, Yang et al. 2020
+};
 
 enum class Minimizer { kLevenbergMarquardt, kDogleg };
 
@@ -40,8 +49,9 @@ struct SolveOptions {
   LandmarkModel landmark_model = LandmarkModel::kEllipsoid;
   Start start = Start::kSphere;
   Schedule schedule = Schedule::kGrow;
-  Loss loss = Loss::kNone;                   ///< on whole boxes; odometry is always quadratic
-  double loss_scale = 2.0;                   ///< sigmas of a whole box
+  Loss loss = Loss::kNone;
+  double loss_scale = 2.0;                   ///< of Huber and Cauchy: sigmas of a whole box
+  double outlier_chi_square = 13.28;         ///< of the others: 99 % of chi-square with 4 dof
   double algebraic_sigma = 1.0;              ///< of both algebraic residuals, their own unit
   Minimizer minimizer = Minimizer::kDogleg;  ///< of the last stage
   int max_iterations = 300;                  ///< of each batch stage

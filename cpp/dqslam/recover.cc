@@ -35,6 +35,7 @@ Stage BatchStage(const PreparedGraph& prepared, const SolveOptions& options) {
   std::iota(stage.boxes.begin(), stage.boxes.end(), 0);
   stage.residual =
       options.residual == Residual::kTangentThenBox ? Residual::kBox : options.residual;
+  stage.loss = options.loss;
   stage.minimizer = options.minimizer;
   stage.max_iterations = options.max_iterations;
   stage.function_tolerance = options.function_tolerance;

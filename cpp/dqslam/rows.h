@@ -10,8 +10,6 @@
 
 namespace dqslam {
 
-using Mask = Eigen::Array<bool, Eigen::Dynamic, 1>;
-
 /// a_from_c = a_from_b o b_from_c, shapes (n, d).
 RowMatrix ComposeRows(PoseModel model, const RowMatrix& a_from_b, const RowMatrix& b_from_c);
 /// b_from_c = a_from_b^-1 o a_from_c, shapes (n, d).

@@ -5,6 +5,7 @@
 
 #include "dqslam/grow.h"
 #include "dqslam/recover.h"
+#include "dqslam/robust.h"
 
 namespace dqslam {
 namespace {
@@ -53,6 +54,13 @@ class Solver {
     return values;
   }
 
+  Mask Inliers(const State& state) const {
+    const std::vector<bool> inliers = InlierBoxes(prepared_, options_, state);
+    Mask mask(inliers.size());
+    std::copy(inliers.begin(), inliers.end(), mask.begin());
+    return mask;
+  }
+
   Summary Run(const std::optional<State>& start, State* state) {
     const bool refine = options_.residual == Residual::kTangentThenBox;
     Summary summary;
@@ -67,6 +75,11 @@ class Solver {
         StartAll(state);
         if (refine) Append(Batch(Residual::kTangent, state), &summary);
       }
+    }
+    state->switches = Eigen::VectorXd::Ones(graph_.boxes.size());
+    if (options_.loss == Loss::kGncTls || options_.loss == Loss::kGncGm) {
+      Append(GraduateNonConvexity(prepared_, options_, monitor_, state), &summary);
+      return summary;
     }
     const Stage last = BatchStage(prepared_, options_);
     Append(Batch(last.residual, state), &summary);
@@ -109,6 +122,7 @@ Solution Solve(const Graph& graph, const SolveOptions& options, const std::optio
                                      ? solver.SvdSingularValues()
                                      : RowMatrix::Constant(graph.num_objects(), 10, std::nan(""));
   solution.poses = state.poses;
+  solution.inliers = solver.Inliers(state);
   solution.landmarks = state.landmarks;
   solution.dual_quadrics = state.landmarks;
   if (options.landmark_model == LandmarkModel::kEllipsoid) {

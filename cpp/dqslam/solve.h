@@ -14,6 +14,7 @@ struct Solution {
   RowMatrix landmarks;            ///< (objects, 9) parameters of the landmark model
   RowMatrix dual_quadrics;        ///< (objects, 9) q1 .. q9, whichever the model
   RowMatrix svd_singular_values;  ///< (objects, 10) of the SVD starts; NaN where not used
+  Mask inliers;                   ///< (boxes) chi-square at most options.outlier_chi_square
   Summary summary;
 };
 
