@@ -53,7 +53,7 @@ def plot_maps(maps: Sequence[tuple[str, Estimate, Truth]], path: str | Path) -> 
         axes.set_xlabel("x [m]")
     for axes in grid[:, 0]:
         axes.set_ylabel("y [m]")
-    _draw_legend(figure)
+    _draw_legend(figure, crosses=any(not estimate.is_ellipsoid.all() for _, estimate, _ in maps))
     figure.savefig(path, dpi=150)
 
 
@@ -83,7 +83,7 @@ def _draw_map(axes: "Axes", estimate: Estimate, truth: Truth) -> None:
             axes.plot(*center[:2], "x", color=ESTIMATE, markersize=5)
 
 
-def _draw_legend(figure: "Figure") -> None:
+def _draw_legend(figure: "Figure", *, crosses: bool) -> None:
     from matplotlib.lines import Line2D
 
     handles = [
@@ -96,6 +96,10 @@ def _draw_legend(figure: "Figure") -> None:
             [], [], color=ESTIMATE, marker="o", fillstyle="none", linewidth=0, label="mapped object"
         ),
     ]
+    if crosses:
+        handles.append(
+            Line2D([], [], color=ESTIMATE, marker="x", linewidth=0, label="mapped, no ellipsoid")
+        )
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), frameon=False)
 
 
