@@ -4,7 +4,6 @@
 
 #include <Eigen/Core>
 #include <cmath>
-#include <functional>
 #include <limits>
 
 #include "dqslam/camera.h"
@@ -56,9 +55,10 @@ inline Viewpoint LookAt(const Eigen::Vector3d& position,
   return view;
 }
 
-/// Largest value of f over the unit sphere, for an f with one maximum: dense samples, then a
-/// pattern search around the best of them.
-inline double Maximum(const std::function<double(const Eigen::Vector3d&)>& f) {
+/// Direction of the unit sphere with the largest f, for an f with one maximum: dense samples, then
+/// a pattern search around the best of them.
+template <typename Function>
+Eigen::Vector3d ArgMax(const Function& f) {
   constexpr int kSamples = 2000;
   Eigen::Vector3d best = Eigen::Vector3d::UnitX();
   double best_value = -std::numeric_limits<double>::infinity();
@@ -84,29 +84,54 @@ inline double Maximum(const std::function<double(const Eigen::Vector3d&)>& f) {
     }
     if (!moved) step /= 2;
   }
-  return best_value;
+  return best;
 }
+
+/// The surface in the frame of a camera: center + axes d over the unit sphere.
+struct Surface {
+  Surface(const Viewpoint& view, const Ellipsoid& e)
+      : center(view.ToCamera(e.center)),
+        axes(view.rotation.transpose() * RotationMatrix(e.orientation_xyzw) *
+             e.semi_axes.asDiagonal()) {}
+  Eigen::Vector3d Point(const Eigen::Vector3d& d) const { return center + axes * d; }
+
+  Eigen::Vector3d center;
+  Eigen::Matrix3d axes;
+};
 
 /// Smallest depth of a surface point.
 inline double NearestDepth(const Viewpoint& view, const Ellipsoid& ellipsoid) {
-  return -Maximum([&](const Eigen::Vector3d& d) { return -view.ToCamera(ellipsoid.Point(d)).z(); });
+  const Surface surface(view, ellipsoid);
+  const auto nearness = [&](const Eigen::Vector3d& d) { return -surface.Point(d).z(); };
+  return -nearness(ArgMax(nearness));
 }
 
-/// Box of all projected surface points [px]; the ellipsoid must be in front.
+/// Pixels of the surface points that project furthest out at each edge (u_min, v_min, u_max,
+/// v_max), one a row; the ellipsoid must be in front.
+inline Eigen::Matrix<double, 4, 2> ExtremePixels(const Camera& camera,
+                                                 const Viewpoint& view,
+                                                 const Ellipsoid& ellipsoid) {
+  const Surface surface(view, ellipsoid);
+  const auto pixel = [&](const Eigen::Vector3d& d) {
+    const Eigen::Vector3d p = surface.Point(d);
+    return Eigen::Vector2d(camera.fx * p.x() / p.z() + camera.cx,
+                           camera.fy * p.y() / p.z() + camera.cy);
+  };
+  Eigen::Matrix<double, 4, 2> pixels;
+  for (int edge = 0; edge < 4; ++edge) {
+    const double outward = edge < 2 ? -1 : 1;
+    pixels.row(edge) =
+        pixel(ArgMax([&](const Eigen::Vector3d& d) { return outward * pixel(d)[edge % 2]; }));
+  }
+  return pixels;
+}
+
+/// Box of all projected surface points [px].
 inline Eigen::Vector4d Box(const Camera& camera,
                            const Viewpoint& view,
                            const Ellipsoid& ellipsoid) {
-  const auto pixel = [&](const Eigen::Vector3d& d, int axis) {
-    const Eigen::Vector3d p = view.ToCamera(ellipsoid.Point(d));
-    return axis == 0 ? camera.fx * p.x() / p.z() + camera.cx
-                     : camera.fy * p.y() / p.z() + camera.cy;
-  };
-  Eigen::Vector4d box;
-  for (int axis = 0; axis < 2; ++axis) {
-    box[axis] = -Maximum([&](const Eigen::Vector3d& d) { return -pixel(d, axis); });
-    box[axis + 2] = Maximum([&](const Eigen::Vector3d& d) { return pixel(d, axis); });
-  }
-  return box;
+  const Eigen::Matrix<double, 4, 2> pixels = ExtremePixels(camera, view, ellipsoid);
+  return {pixels(0, 0), pixels(1, 1), pixels(2, 0), pixels(3, 1)};
 }
 
 }  // namespace dqslam::oracle
