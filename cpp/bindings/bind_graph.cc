@@ -10,6 +10,23 @@ using namespace pybind11::literals;
 namespace dqslam {
 
 void BindGraph(py::module_& m) {
+  py::class_<ScenePriors>(
+      m, "ScenePriors", "What is known of the scene; each part is off while its sigma is 0.")
+      .def(py::init([](const py::kwargs& values) {
+             py::object priors = py::cast(ScenePriors());
+             for (const auto& [name, value] : values) py::setattr(priors, name, value);
+             return priors.cast<ScenePriors>();
+           }),
+           "Any of the attributes as keywords.")
+      .def_readwrite("up", &ScenePriors::up, "Unit normal n of the ground, in the world, (3,).")
+      .def_readwrite("plane_offset", &ScenePriors::plane_offset,
+                     "d of the ground n.x + d = 0, metres.")
+      .def_readwrite("upright_sigma", &ScenePriors::upright_sigma,
+                     "A principal axis of each object is vertical: radians.")
+      .def_readwrite("support_sigma", &ScenePriors::support_sigma,
+                     "Each object stands on the ground: metres.")
+      .def_readwrite("camera_height", &ScenePriors::camera_height, "Metres above the ground.")
+      .def_readwrite("camera_height_sigma", &ScenePriors::camera_height_sigma, "Metres.");
   py::class_<Graph>(m, "Graph", "The problem as plain tables; ids are row numbers. Immutable.")
       .def(py::init([](PoseModel pose_model, const Camera& camera, RowMatrix initial_poses,
                        IndexVector odometry_from, IndexVector odometry_to, RowMatrix odometry,
@@ -18,7 +35,7 @@ void BindGraph(py::module_& m) {
                        IndexVector position_pose,
                        IndexVector position_object, RowMatrix positions,
                        RowMatrix position_covariance, Eigen::VectorXd log_size_mean,
-                       Eigen::VectorXd log_size_sigma) {
+                       Eigen::VectorXd log_size_sigma, const ScenePriors& scene_priors) {
              const BoolTable none = BoolTable::Constant(boxes.rows(), kBoxSize, false);
              Graph graph{pose_model,
                          camera,
@@ -26,7 +43,8 @@ void BindGraph(py::module_& m) {
                          {odometry_from, odometry_to, odometry, odometry_covariance},
                          {box_pose, box_object, boxes, box_covariance, box_truncated.value_or(none)},
                          {position_pose, position_object, positions, position_covariance},
-                         {log_size_mean, log_size_sigma}};
+                         {log_size_mean, log_size_sigma},
+                         scene_priors};
              Validate(graph, /*poses_known=*/true);  // solve() asks for odometry where it needs it
              return graph;
            }),
@@ -35,6 +53,7 @@ void BindGraph(py::module_& m) {
            "boxes"_a, "box_covariance"_a, "box_truncated"_a = std::nullopt, "position_pose"_a = IndexVector(),
            "position_object"_a = IndexVector(), "positions"_a = RowMatrix(0, 3),
            "position_covariance"_a = RowMatrix(0, 9), "log_size_mean"_a, "log_size_sigma"_a,
+           "scene_priors"_a = ScenePriors(),
            "Shapes, with d the size of a pose and k of its tangent: initial_poses (n, d); odometry "
            "(m, d), to_in_from, with covariance (m, k * k); boxes (b, 4) undistorted pixels with "
            "covariance (b, 16) and box_truncated (b, 4), edges cut by the image border; positions (p, 3) object_in_robot, metres, with covariance (p, 9); "
@@ -61,6 +80,7 @@ void BindGraph(py::module_& m) {
       .def_property_readonly("log_size_mean", [](const Graph& g) { return g.size_prior.log_mean; })
       .def_property_readonly("log_size_sigma",
                              [](const Graph& g) { return g.size_prior.log_sigma; })
+      .def_readonly("scene_priors", &Graph::scene_priors)
       .def_property_readonly("num_poses", &Graph::num_poses)
       .def_property_readonly("num_objects", &Graph::num_objects);
 }

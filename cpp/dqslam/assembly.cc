@@ -8,6 +8,7 @@
 #include "dqslam/costs/losses.h"
 #include "dqslam/costs/odometry.h"
 #include "dqslam/costs/relative_position.h"
+#include "dqslam/costs/scene_priors.h"
 #include "dqslam/costs/size_prior.h"
 #include "dqslam/costs/tangent.h"
 #include "dqslam/dispatch.h"
@@ -38,7 +39,8 @@ class Assembler {
       takes_part[graph_.boxes.object[row]] = true;
     }
     AddPositions(takes_part);
-    if (Landmark::kModel == LandmarkModel::kEllipsoid) AddSizePriors(takes_part);
+    if (Landmark::kModel == LandmarkModel::kEllipsoid) AddObjectPriors(takes_part);
+    AddCameraHeight();
   }
 
  private:
@@ -148,12 +150,33 @@ class Assembler {
     }
   }
 
-  void AddSizePriors(const std::vector<bool>& takes_part) {
+  void AddObjectPriors(const std::vector<bool>& takes_part) {
     for (int object = 0; object < graph_.num_objects(); ++object) {
       if (!takes_part[object]) continue;
       problem_.AddResidualBlock(SizePriorCost::Create(graph_.size_prior.log_mean[object],
                                                       graph_.size_prior.log_sigma[object]),
                                 nullptr, LandmarkAt(object));
+      const ScenePriors& scene = graph_.scene_priors;
+      if (scene.upright_sigma > 0) {
+        problem_.AddResidualBlock(UprightCost::Create(scene.up, scene.upright_sigma), nullptr,
+                                  LandmarkAt(object));
+      }
+      if (scene.support_sigma > 0) {
+        problem_.AddResidualBlock(
+            SupportPlaneCost::Create(scene.up, scene.plane_offset, scene.support_sigma), nullptr,
+            LandmarkAt(object));
+      }
+    }
+  }
+
+  void AddCameraHeight() {
+    const ScenePriors& scene = graph_.scene_priors;
+    if (scene.camera_height_sigma == 0) return;
+    for (int pose = stage_.first_free_pose; pose < stage_.end_pose; ++pose) {
+      problem_.AddResidualBlock(
+          CameraHeightCost<Pose>::Create(prepared_.mount, scene.up, scene.plane_offset,
+                                         scene.camera_height, scene.camera_height_sigma),
+          nullptr, PoseAt(pose));
     }
   }
 

@@ -110,6 +110,19 @@ void ValidateBoxes(const Graph& graph) {
   }
 }
 
+void ValidateScenePriors(const ScenePriors& priors) {
+  const Eigen::Vector4d numbers(priors.plane_offset, priors.upright_sigma, priors.support_sigma,
+                                priors.camera_height_sigma);
+  if (!priors.up.allFinite() || std::abs(priors.up.norm() - 1) > 1e-6) {
+    throw std::invalid_argument("scene_priors: up must be a unit vector");
+  }
+  if (!numbers.allFinite() || !std::isfinite(priors.camera_height) ||
+      numbers.tail<3>().minCoeff() < 0) {
+    throw std::invalid_argument(
+        "scene_priors: numbers must be finite, and sigmas positive, or 0 for off");
+  }
+}
+
 }  // namespace
 
 void Validate(const Graph& graph, bool poses_known) {
@@ -126,6 +139,7 @@ void Validate(const Graph& graph, bool poses_known) {
   }
   ValidateOdometry(graph, poses_known);
   ValidateBoxes(graph);
+  ValidateScenePriors(graph.scene_priors);
 
   const PositionTable& positions = graph.positions;
   CheckIds("position_pose", positions.pose, positions.size(), graph.num_poses());

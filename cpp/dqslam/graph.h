@@ -40,6 +40,16 @@ struct SizePriorTable {
   Eigen::VectorXd log_mean, log_sigma;  ///< one row an object
 };
 
+/// What is known of the scene; each part is off while its sigma is 0.
+struct ScenePriors {
+  Eigen::Vector3d up = Eigen::Vector3d::UnitZ();  ///< unit normal n of the ground, in the world
+  double plane_offset = 0;         ///< d of the ground n.x + d = 0, metres
+  double upright_sigma = 0;        ///< radians: a principal axis of each object is vertical
+  double support_sigma = 0;        ///< metres: each object stands on the ground
+  double camera_height = 0;        ///< metres above the ground
+  double camera_height_sigma = 0;  ///< metres
+};
+
 struct Graph {
   PoseModel pose_model = PoseModel::kSe2;
   Camera camera;
@@ -48,6 +58,7 @@ struct Graph {
   BoxTable boxes;
   PositionTable positions;
   SizePriorTable size_prior;
+  ScenePriors scene_priors;
 
   int num_poses() const { return static_cast<int>(initial_poses.rows()); }
   int num_objects() const { return static_cast<int>(size_prior.log_mean.size()); }

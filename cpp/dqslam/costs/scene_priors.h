@@ -1,0 +1,65 @@
+// What is known of a scene beside its boxes: objects that stand upright, on a plane, and the height
+// of the camera above that plane {x : n.x + d = 0}, n the unit normal that points up.
+//
+//   UprightCost        r = cross(n, S n) / (n^T S n sigma)     two of three entries are independent
+//                      zero when n is a principal axis of the object; about tilt [rad] times
+//                      (1 - ratio of squared semi-axes) for a small tilt
+//   SupportPlaneCost   r = (n.c + d - |L^T n|) / sigma          the lowest point lies on the plane
+//   CameraHeightCost   r = (n.camera + d - height) / sigma
+//
+// Blocks: ellipsoid [9]; ellipsoid [9]; world_from_robot [d].  Residuals: [3], [1], [1], in sigmas.
+// None of them fails.
+#pragma once
+
+#include "dqslam/costs/cost.h"
+#include "dqslam/ellipsoid.h"
+
+namespace dqslam {
+
+struct UprightCost : AutoDiffCost<UprightCost, 3, kLandmarkSize> {
+  Eigen::Vector3d up;
+  double sigma;  ///< radians of tilt
+
+  template <typename T>
+  bool operator()(const T* ellipsoid, T* residual) const {
+    const Vector3<T> n = up.cast<T>();
+    const Vector3<T> image = EllipsoidModel::Unpack(ellipsoid).shape * n;
+    Eigen::Map<Vector3<T>> r(residual);
+    r = n.cross(image) / (n.dot(image) * T(sigma));
+    return true;
+  }
+};
+
+struct SupportPlaneCost : AutoDiffCost<SupportPlaneCost, 1, kLandmarkSize> {
+  Eigen::Vector3d up;
+  double offset;  ///< d, metres
+  double sigma;   ///< metres
+
+  template <typename T>
+  bool operator()(const T* ellipsoid, T* residual) const {
+    using std::sqrt;
+    const Surface<T> surface = EllipsoidModel::Unpack(ellipsoid);
+    const Vector3<T> n = up.cast<T>();
+    const T half_height = sqrt(n.dot(surface.shape * n));
+    residual[0] = (n.dot(surface.center) + T(offset) - half_height) / T(sigma);
+    return true;
+  }
+};
+
+template <typename Pose>
+struct CameraHeightCost : AutoDiffCost<CameraHeightCost<Pose>, 1, Pose::kSize> {
+  Mount mount;
+  Eigen::Vector3d up;
+  double offset;  ///< d, metres
+  double height;  ///< metres
+  double sigma;   ///< metres
+
+  template <typename T>
+  bool operator()(const T* pose, T* residual) const {
+    const CameraInWorld<T> camera = LocateCamera<Pose>(pose, mount);
+    residual[0] = (up.cast<T>().dot(camera.position) + T(offset - height)) / T(sigma);
+    return true;
+  }
+};
+
+}  // namespace dqslam
