@@ -51,7 +51,7 @@ def test_objects_can_be_chosen(tmp_path):
         ("laps = 2", "laps = 2\nlap = 2", r"path\.lap: Extra inputs are not permitted"),
         ("step_m = 0.5", "step_m = nan", r"path\.step_m: .* finite"),
         ("step_m = 0.5", "step_m = inf", r"path\.step_m: .* finite"),
-        ("start_fraction = 0.0", "start_fraction = 1.5", r"path\.start_fraction: .* less than"),
+        ("start_fraction = 0.5", "start_fraction = 1.5", r"path\.start_fraction: .* less than"),
         ("sigma_m = 0.1   ", "sigma_m = -0.1   ", r"relative_position\.sigma_m: .* greater than 0"),
         ("[0.8, 1.4]", "[1.4, 0.8]", r"world: .*semi_axis_factor: the first number is above"),
         ("[world]", "[wrld]", r"world: Field required; wrld: Extra inputs"),

