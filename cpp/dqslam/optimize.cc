@@ -4,6 +4,7 @@
 #include <ceres/solver.h>
 #include <omp.h>
 
+#include <algorithm>
 #include <limits>
 
 #include "dqslam/assembly.h"
@@ -59,11 +60,27 @@ ceres::Solver::Options CeresOptions(const Stage& stage) {
   return ceres_options;
 }
 
-std::string Words(const ceres::Solver::Summary& summary) {
-  if (summary.num_successful_steps == 0 && summary.num_unsuccessful_steps > 0) {
-    return "every step was rejected: " + summary.message;
+Summary Summarize(const ceres::Solver::Summary& ceres_summary, const MonitorCallback& callback) {
+  Summary summary;
+  summary.seconds = ceres_summary.total_time_in_seconds;
+  summary.message = ceres_summary.message;
+  if (ceres_summary.termination_type == ceres::FAILURE && ceres_summary.iterations.empty()) {
+    summary.initial_cost = summary.final_cost = std::numeric_limits<double>::infinity();
+    summary.message = "a residual is undefined at the start: " + summary.message;
+    return summary;
   }
-  return summary.message;
+  summary.initial_cost = ceres_summary.initial_cost;
+  summary.final_cost = ceres_summary.final_cost;
+  // Without variables, Ceres has no iterations and leaves the counts at -1.
+  summary.iterations = std::max(static_cast<int>(ceres_summary.iterations.size()) - 1, 0);
+  summary.rejected_steps = std::max(ceres_summary.num_unsuccessful_steps, 0);
+  summary.gradient_norm_start = callback.first_gradient_norm;
+  summary.gradient_norm_end = callback.last_gradient_norm;
+  // Ceres counts the starting point as a successful step.
+  const bool all_rejected = ceres_summary.num_successful_steps <= 1 && summary.rejected_steps > 0;
+  summary.converged = ceres_summary.termination_type == ceres::CONVERGENCE && !all_rejected;
+  if (all_rejected) summary.message = "every step was rejected: " + summary.message;
+  return summary;
 }
 
 }  // namespace
@@ -81,18 +98,7 @@ Summary Optimize(const PreparedGraph& prepared, const SolveOptions& options, con
   ceres::Solve(ceres_options, &problem, &ceres_summary);
   if (callback.stopped) throw Interrupted();
 
-  Summary summary;
-  summary.initial_cost = ceres_summary.initial_cost;
-  summary.final_cost = ceres_summary.final_cost;
-  summary.iterations = static_cast<int>(ceres_summary.iterations.size()) - 1;
-  summary.rejected_steps = ceres_summary.num_unsuccessful_steps;
-  summary.gradient_norm_start = callback.first_gradient_norm;
-  summary.gradient_norm_end = callback.last_gradient_norm;
-  summary.seconds = ceres_summary.total_time_in_seconds;
-  summary.converged = ceres_summary.termination_type == ceres::CONVERGENCE &&
-                      (ceres_summary.num_successful_steps > 0 || summary.iterations == 0);
-  summary.message = Words(ceres_summary);
-  return summary;
+  return Summarize(ceres_summary, callback);
 }
 
 Eigen::VectorXd BoxCosts(const PreparedGraph& prepared, const SolveOptions& options,
