@@ -16,6 +16,7 @@ void ValidateOptions(const SolveOptions& options) {
   };
   require(options.algebraic_sigma > 0, "algebraic_sigma must be positive");
   require(options.loss_scale > 0, "loss_scale must be positive");
+  require(options.outlier_chi_square > 0, "outlier_chi_square must be positive");
   require(options.max_iterations > 0, "max_iterations must be positive");
   require(options.function_tolerance > 0, "function_tolerance must be positive");
   require(options.grow_poses > 0, "grow_poses must be positive");
@@ -31,6 +32,10 @@ void ValidateStart(const Graph& graph, const State& start) {
     throw std::invalid_argument("start: need finite poses (" + std::to_string(graph.num_poses()) +
                                 ", " + std::to_string(graph.pose_size()) + ") and landmarks (" +
                                 std::to_string(graph.num_objects()) + ", 9)");
+  }
+  if (graph.pose_model == PoseModel::kSe3 &&
+      ((start.poses.rightCols<4>().rowwise().norm().array() - 1).abs() > 1e-6).any()) {
+    throw std::invalid_argument("start: the quaternions of the poses must be unit");
   }
 }
 
@@ -64,8 +69,9 @@ class Solver {
   Summary Run(const std::optional<State>& start, State* state) {
     const bool refine = options_.residual == Residual::kTangentThenBox;
     Summary summary;
+    if (start) *state = *start;
+    state->switches = Eigen::VectorXd::Ones(graph_.boxes.size());
     if (start) {
-      *state = *start;
     } else {
       state->poses = graph_.initial_poses;
       state->landmarks = RowMatrix::Zero(graph_.num_objects(), kLandmarkSize);
@@ -76,7 +82,6 @@ class Solver {
         if (refine) Append(Batch(Residual::kTangent, state), &summary);
       }
     }
-    state->switches = Eigen::VectorXd::Ones(graph_.boxes.size());
     if (options_.loss == Loss::kGncTls || options_.loss == Loss::kGncGm) {
       Append(GraduateNonConvexity(prepared_, options_, monitor_, state), &summary);
       return summary;
