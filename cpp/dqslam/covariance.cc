@@ -8,6 +8,7 @@
 
 #include "dqslam/assembly.h"
 #include "dqslam/recover.h"
+#include "dqslam/robust.h"
 #include "dqslam/selected_inverse.h"
 
 namespace dqslam {
@@ -25,7 +26,12 @@ class Information {
  public:
   Information(const PreparedGraph& prepared, const SolveOptions& options, State state)
       : graph_(prepared.graph), state_(std::move(state)) {
-    const Stage stage = BatchStage(prepared, options);
+    Stage stage = BatchStage(prepared, options);
+    if (IsRobust(options.loss)) {
+      const std::vector<bool> inliers = InlierBoxes(prepared, options, state_);
+      stage.weights.assign(inliers.begin(), inliers.end());
+      stage.loss = Loss::kNone;
+    }
     first_free_pose_ = stage.first_free_pose;
     ceres::Problem problem;
     Assemble(prepared, options, stage, &state_, &problem);

@@ -19,6 +19,7 @@ struct Covariance {
 };
 
 /// Marginal covariances at a state.  At the true state this is the posterior Cramer-Rao bound.
+/// With a robust loss, boxes that are outliers at the state take no part.
 /// In mapping mode all poses are fixed.  Throws std::invalid_argument for a state that does not fit
 /// and std::runtime_error where a residual of the last stage is undefined at it.
 Covariance ComputeCovariance(const Graph& graph, const SolveOptions& options, const State& state);

@@ -67,32 +67,36 @@ class Solver {
   }
 
   Summary Run(const std::optional<State>& start, State* state) {
-    const bool refine = options_.residual == Residual::kTangentThenBox;
-    Summary summary;
-    if (start) *state = *start;
     state->switches = Eigen::VectorXd::Ones(graph_.boxes.size());
+    Summary summary;
     if (start) {
+      state->poses = start->poses;
+      state->landmarks = start->landmarks;
     } else {
-      state->poses = graph_.initial_poses;
-      state->landmarks = RowMatrix::Zero(graph_.num_objects(), kLandmarkSize);
-      if (options_.schedule == Schedule::kGrow && options_.mode == Mode::kSlam) {
-        summary = Grow(prepared_, options_, monitor_, state);
-      } else {
-        StartAll(state);
-        if (refine) Append(Batch(Residual::kTangent, state), &summary);
-      }
+      summary = ReachStart(state);
     }
     if (options_.loss == Loss::kGncTls || options_.loss == Loss::kGncGm) {
       Append(GraduateNonConvexity(prepared_, options_, monitor_, state), &summary);
       return summary;
     }
-    const Stage last = BatchStage(prepared_, options_);
-    Append(Batch(last.residual, state), &summary);
-    if (refine) RestartStuckObjects(prepared_, options_, monitor_, state, &summary);
+    Append(Batch(BatchStage(prepared_, options_).residual, state), &summary);
+    if (Refines()) RestartStuckObjects(prepared_, options_, monitor_, state, &summary);
     return summary;
   }
 
  private:
+  bool Refines() const { return options_.residual == Residual::kTangentThenBox; }
+
+  Summary ReachStart(State* state) {
+    state->poses = graph_.initial_poses;
+    state->landmarks = RowMatrix::Zero(graph_.num_objects(), kLandmarkSize);
+    if (options_.schedule == Schedule::kGrow && options_.mode == Mode::kSlam) {
+      return Grow(prepared_, options_, monitor_, state);
+    }
+    StartAll(state);
+    return Refines() ? Batch(Residual::kTangent, state) : Summary();
+  }
+
   void StartAll(State* state) {
     for (int object = 0; object < graph_.num_objects(); ++object) {
       state->landmarks.row(object) =
