@@ -6,12 +6,13 @@ with whole numbers at pixel centres. d is the pose size (3 or 7), k the tangent 
 Every array is copied, checked and made read-only; what is wrong is named by array and row.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dqslam._checks import Floats, Ints, as_covariances, as_floats, as_ints, reject_rows
+from dqslam._checks import Bools, Floats, Ints, as_covariances, as_floats, as_ints, reject_rows
 from dqslam._core import Camera, PoseModel
 
 
@@ -82,6 +83,9 @@ class Detections:
     """Which object it shows, -1 when unknown; shape (m,)."""
     class_names: dict[int, str] = field(default_factory=dict)
     """Name of every class id that occurs."""
+    truncated: Bools = field(default_factory=lambda: np.zeros((0, 4), dtype=np.bool_))
+    """Which edges are the border of the image, which the object leaves; shape (m, 4), none by
+    default."""
 
     def __post_init__(self) -> None:
         """Check shapes and numbers."""
@@ -100,11 +104,17 @@ class Detections:
             score=as_floats("detections.score", self.score, [count]),
             class_id=class_id,
             object_id=object_id,
+            truncated=_as_edges("detections.truncated", self.truncated, count),
         )
 
     def __len__(self) -> int:
         """Return the number of boxes."""
         return len(self.box)
+
+    def select(self, rows: Ints | Bools) -> Self:
+        """Return some of the boxes: their rows, or a flag for each box (m,)."""
+        names = ("pose", "box", "score", "class_id", "object_id", "truncated")
+        return replace(self, **{name: getattr(self, name)[rows] for name in names})
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,10 +176,25 @@ class Recording:
         _set(self, timestamps=timestamps)
 
     def _check_boxes_meet_image(self) -> None:
+        if self.camera.has_distortion:
+            return  # the image is no rectangle in undistorted pixels
         box = self.detections.box
         last = np.array([self.camera.width, self.camera.height]) - 0.5
         outside = (box[:, 2:] <= -0.5) | (box[:, :2] >= last)
         reject_rows("detections.box", outside, "box outside the image", box)
+
+
+def _as_edges(name: str, values: ArrayLike, count: int) -> Bools:
+    """Return read-only flags of the four edges of each box, shape (count, 4); none by default."""
+    flags = np.array(values)
+    if not flags.size:
+        flags = np.zeros((count, 4), dtype=np.bool_)
+    if flags.shape != (count, 4):
+        raise ValueError(f"{name}: expected shape ({count}, 4), got {flags.shape}")
+    reject_rows(name, ~np.isin(flags, [0, 1]), "not true or false", flags)
+    edges = flags.astype(np.bool_)
+    edges.setflags(write=False)
+    return edges
 
 
 def _check_poses(name: str, rows: Ints, count: int) -> None:
@@ -193,6 +218,8 @@ class Truth:
     """One per object."""
     ellipsoids: Floats | None = None
     """Centre and log-Cholesky shape, shape (o, 9); None when the objects are no ellipsoids."""
+    box_object_id: Ints | None = None
+    """Which object each box of the recording shows, whatever its id says; shape (m,)."""
 
     def __post_init__(self) -> None:
         """Check shapes and numbers."""
@@ -207,6 +234,11 @@ class Truth:
         ellipsoids = self.ellipsoids
         if ellipsoids is not None:
             ellipsoids = as_floats("truth.ellipsoids", ellipsoids, [count, 9])
+        box_object_id = self.box_object_id
+        if box_object_id is not None:
+            box_object_id = as_ints("truth.box_object_id", box_object_id)
+            unknown = ~np.isin(box_object_id, object_id)
+            reject_rows("truth.box_object_id", unknown, "no such object", box_object_id)
         _set(
             self,
             poses=as_poses("truth.poses", self.poses, self.pose_model),
@@ -215,4 +247,5 @@ class Truth:
             volume=volume,
             class_name=tuple(self.class_name),
             ellipsoids=ellipsoids,
+            box_object_id=box_object_id,
         )

@@ -1,6 +1,7 @@
 """Scenarios: the settings of a simulated world, read from TOML.
 
-No setting has a default here: the file is their only home. Names carry their unit.
+The file is the only home of the settings; what has a default here is off by default. Names carry
+their unit.
 """
 
 import tomllib
@@ -13,6 +14,7 @@ Positive = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
 Count = Annotated[int, Field(ge=1)]
 ObjectKind = Literal["cubes", "ellipsoids"]
+WrongAssociationKind = Literal["random", "structured"]
 
 
 class _Settings(BaseModel):
@@ -67,11 +69,19 @@ class WorldSettings(_Settings):
 
 
 class DetectorSettings(_Settings):
-    """When an object gives a box, and how exact it is."""
+    """When an object gives a box, how exact it is, and whose it is said to be."""
 
     min_side_px: NotNegative
     """An object is detected when the longer side of its box exceeds this."""
     edge_sigma_px: NotNegative
+    truncation: Literal["discard", "clip"] = "discard"
+    """What becomes of a box that leaves the image: none, or the part inside of the image."""
+    min_visible_fraction: Annotated[float, Field(gt=0.0, le=1.0)] = 0.3
+    """With "clip": the least part of the whole box's area that is inside of the image."""
+    wrong_associations: Annotated[float, Field(ge=0.0, le=0.4)] = 0.0
+    """Share of the boxes that carry the id of another detected object."""
+    wrong_association_kind: WrongAssociationKind = "random"
+    """Which one: any, or the one whose centre is nearest ("structured")."""
 
 
 class OdometrySettings(_Settings):

@@ -1,5 +1,6 @@
 """Simulated recordings: from a scenario and a seed to what a robot would have recorded."""
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -8,6 +9,7 @@ from numpy.random import Generator, SeedSequence, default_rng
 from dqslam import _core
 from dqslam._checks import Bools, Floats
 from dqslam._core import Camera, PoseModel
+from dqslam.detector import associate, cut_at_border, is_detected
 from dqslam.recording import Detections, Odometry, Recording, RelativePositions, Truth
 from dqslam.scenario import CameraSettings, PathSettings, Scenario
 
@@ -27,14 +29,15 @@ class _World(NamedTuple):
 def simulate(scenario: Scenario, *, seed: int) -> tuple[Recording, Truth]:
     """Drive through a world of objects and record odometry, boxes and relative positions.
 
-    World, odometry, boxes and positions each have a random stream of their own, and every pair of
-    pose and object its own numbers: changing one setting leaves the others' noise as it was.
-    Objects are in the recording only if they were detected; the truth has all.
+    World, odometry, boxes, positions and wrong ids each have a random stream of their own, and
+    every pair of pose and object its own numbers: changing one setting leaves the others' noise as
+    it was. Objects are in the recording only if they were detected; the truth has all. Wrong are
+    the ids of boxes only; a relative position is always its object's.
     """
     if seed < 0:
         raise ValueError(f"seed: expected zero or more, got {seed}")
-    for_world, for_odometry, for_boxes, for_positions = map(
-        default_rng, SeedSequence(seed).spawn(4)
+    for_world, for_odometry, for_boxes, for_positions, for_ids = map(
+        default_rng, SeedSequence(seed).spawn(5)
     )
     camera = _camera(scenario.camera)
     relative, is_turn = _drive(scenario.path)
@@ -43,17 +46,24 @@ def simulate(scenario: Scenario, *, seed: int) -> tuple[Recording, Truth]:
     truth = _truth(scenario, poses, world)
 
     box, in_front = _boxes(camera, truth, world)
-    seen = np.argwhere(in_front & _is_detected(box, camera, scenario.detector.min_side_px))
+    seen = np.argwhere(in_front & is_detected(box, camera, scenario.detector))
     pose, object_row = seen[:, 0], seen[:, 1]
+    said = associate(pose, object_row, world.center, scenario.detector, for_ids)
     box_noise = for_boxes.normal(0.0, scenario.detector.edge_sigma_px, size=box.shape)
+    measured = (box + box_noise)[pose, object_row]
+    truncated = np.zeros(measured.shape, dtype=np.bool_)
+    if scenario.detector.truncation == "clip":
+        measured, truncated = cut_at_border(measured, camera)
     detections = Detections(
         pose=pose,
-        box=(box + box_noise)[pose, object_row],
+        box=measured,
         score=np.ones(len(seen)),
         class_id=np.zeros(len(seen), dtype=np.int64),
-        object_id=truth.object_id[object_row],
+        object_id=truth.object_id[said],
         class_names={0: truth.class_name[0]},
+        truncated=truncated,
     )
+    has_box = np.isin(truth.object_id[object_row], detections.object_id)
     sigma = scenario.relative_position.sigma_m
     in_robot = _in_robot(poses, world.center)
     position_noise = for_positions.normal(0.0, sigma, size=in_robot.shape)
@@ -63,13 +73,13 @@ def simulate(scenario: Scenario, *, seed: int) -> tuple[Recording, Truth]:
         odometry=_measure_odometry(scenario, poses[0], relative, is_turn, for_odometry),
         detections=detections,
         positions=RelativePositions(
-            pose=pose,
-            object_id=detections.object_id,
-            object_in_robot=(in_robot + position_noise)[pose, object_row],
-            covariance=np.tile(sigma**2 * np.eye(3), (len(seen), 1, 1)),
+            pose=pose[has_box],
+            object_id=truth.object_id[object_row][has_box],
+            object_in_robot=(in_robot + position_noise)[pose, object_row][has_box],
+            covariance=np.tile(sigma**2 * np.eye(3), (int(has_box.sum()), 1, 1)),
         ),
     )
-    return recording, truth
+    return recording, replace(truth, box_object_id=truth.object_id[object_row])
 
 
 def _camera(settings: CameraSettings) -> Camera:
@@ -177,15 +187,6 @@ def _cube_boxes(camera: Camera, poses: Floats, world: _World) -> tuple[Floats, B
     z = np.where(in_front[:, :, None], z, np.nan)
     u, v = camera.fx * x / z + camera.cx, camera.fy * y / z + camera.cy
     return np.stack([u.min(2), v.min(2), u.max(2), v.max(2)], axis=2), in_front
-
-
-def _is_detected(box: Floats, camera: Camera, min_side_px: float) -> Bools:
-    """Say which boxes are large enough and wholly inside the image; NaN is neither."""
-    u_min, v_min, u_max, v_max = np.moveaxis(box, 2, 0)
-    large = np.maximum(u_max - u_min, v_max - v_min) > min_side_px
-    inside = (u_min >= -0.5) & (v_min >= -0.5)
-    inside &= (u_max <= camera.width - 0.5) & (v_max <= camera.height - 0.5)
-    return np.asarray(large & inside)
 
 
 def _measure_odometry(

@@ -116,6 +116,12 @@ HALF_TURN = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.1]
         (detections, {"score": [1.0, np.nan]}, r"detections\.score row 1: not finite"),
         (detections, {"class_id": [3, 4]}, r"class_id row 1: class has no name: 4"),
         (detections, {"object_id": [7, -2]}, r"object_id row 1: not an object id: -2"),
+        (detections, {"truncated": [[True] * 4]}, r"truncated: expected shape \(2, 4\), got \(1"),
+        (
+            detections,
+            {"truncated": [[0, 1, 0, 0], [0, 0, 2, 0]]},
+            r"truncated row 1: not true or false: \[0, 0, 2, 0\]",
+        ),
         (positions, {"covariance": [-np.eye(3)]}, r"positions\.covariance row 0: .*positive def"),
         (positions, {"object_in_robot": [[1.0, 2.0]]}, r"object_in_robot: expected shape \(n, 3"),
         (recording, {"timestamps": [0.0, 1.0, 1.0]}, r"timestamps row 2: time does not increase"),
@@ -135,11 +141,29 @@ HALF_TURN = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.1]
         (truth, {"volume": [1.0, 0.0]}, r"truth\.volume row 1: not positive: 0"),
         (truth, {"class_name": ("cup",)}, r"truth\.class_name: expected 2, got 1"),
         (truth, {"ellipsoids": np.zeros((1, 9))}, r"truth\.ellipsoids: expected shape \(2, 9\)"),
+        (truth, {"box_object_id": [1, 2]}, r"truth\.box_object_id row 1: no such object: 2"),
     ],
 )
 def test_bad_input_names_the_array_and_the_row(make, changes, message):
     with pytest.raises(ValueError, match=message):
         make(**changes)
+
+
+def test_boxes_can_be_selected_by_row_and_by_flag():
+    cut = [[False] * 4, [True, False, False, False]]
+    all_boxes = detections(truncated=cut)
+    for rows in (np.array([1]), np.array([False, True])):
+        one = all_boxes.select(rows)
+        assert (len(one), one.pose.tolist(), one.object_id.tolist()) == (1, [2], [-1])
+        assert one.truncated.tolist() == [cut[1]]
+        assert one.class_names == {3: "cup"}
+    assert not detections().truncated.any()
+
+
+def test_undistorted_boxes_may_lie_outside_of_the_rectangle_of_the_image():
+    lens = Camera(500.0, 500.0, 319.5, 239.5, 640, 480, distortion=[-0.3, 0.1, 0.0, 0.0, 0.0])
+    boxes = detections(box=[[-90.0, 10.0, -1.0, 60.0], [100.0, 100.0, 200.0, 150.0]])
+    assert len(recording(camera=lens, detections=boxes).detections) == 2
 
 
 def test_a_replaced_part_is_checked_again():

@@ -25,6 +25,7 @@ def test_the_papers_values():
     assert scenario.world.height_sigma_m == 0.3
     sides = (scenario.world.side_mean_m, scenario.world.side_sigma_m, scenario.world.side_min_m)
     assert sides == (0.5, 0.3, 0.2)
+    assert (scenario.detector.truncation, scenario.detector.wrong_associations) == ("discard", 0.0)
     assert (scenario.detector.min_side_px, scenario.detector.edge_sigma_px) == (100.0, 1.0)
     odometry = scenario.odometry
     assert (odometry.translation_sigma_m, odometry.rotation_sigma_rad) == (0.02, 0.02)
@@ -54,6 +55,9 @@ def test_objects_can_be_chosen(tmp_path):
         ("start_fraction = 0.5", "start_fraction = 1.5", r"path\.start_fraction: .* less than"),
         ("sigma_m = 0.1   ", "sigma_m = -0.1   ", r"relative_position\.sigma_m: .* greater than 0"),
         ("[0.8, 1.4]", "[1.4, 0.8]", r"world: .*semi_axis_factor: the first number is above"),
+        ('"discard"', '"cut"', r"detector\.truncation: Input should be 'discard' or 'clip'"),
+        ('"random"', '"swap"', r"wrong_association_kind: .*'random' or 'structured'"),
+        ("ciations = 0.0", "ciations = 0.5", r"detector\.wrong_associations: .* equal to 0\.4"),
         ("[world]", "[wrld]", r"world: Field required; wrld: Extra inputs"),
         ("[path]", "[path", r"not a TOML file: .*line"),
     ],
