@@ -21,9 +21,10 @@ class _Settings(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
-class PathSettings(_Settings):
+class RoundedRectangleSettings(_Settings):
     """A rounded rectangle on the plane z = 0, driven counter-clockwise."""
 
+    kind: Literal["rounded_rectangle"]
     length_m: Positive
     width_m: Positive
     start_fraction: Annotated[float, Field(ge=0.0, le=1.0)]
@@ -36,8 +37,33 @@ class PathSettings(_Settings):
     """Time between two poses."""
 
 
+class OrbitSettings(_Settings):
+    """A hand-held way round the world's z axis, looking at the origin, counter-clockwise.
+
+    Sigmas are the root mean square of a slow, smooth wobble.
+    """
+
+    kind: Literal["orbit"]
+    turns: Positive
+    poses: Annotated[int, Field(ge=2)]
+    distance_m: Positive
+    """From the axis."""
+    distance_sigma_m: NotNegative
+    height_m: float
+    """Above the plane z = 0."""
+    height_sigma_m: NotNegative
+    roll_sigma_deg: NotNegative
+    pitch_sigma_deg: NotNegative
+    yaw_sigma_deg: NotNegative
+    period_s: Positive
+    """Time between two poses."""
+
+
+PathSettings = RoundedRectangleSettings | OrbitSettings
+
+
 class CameraSettings(_Settings):
-    """A pinhole camera with a level optical axis."""
+    """A pinhole camera whose optical axis lies in the robot's x-y plane."""
 
     focal_length_mm: Positive
     pixel_size_um: Positive
@@ -48,13 +74,8 @@ class CameraSettings(_Settings):
     position_in_robot_m: tuple[float, float, float]
 
 
-class WorldSettings(_Settings):
-    """Objects, placed uniformly inside the path."""
-
+class _ObjectSettings(_Settings):
     object_count: Count
-    margin_m: NotNegative
-    """Least distance of the centres from the sides of the path."""
-    height_sigma_m: NotNegative
     side_mean_m: Positive
     side_sigma_m: NotNegative
     side_min_m: Positive
@@ -66,6 +87,30 @@ class WorldSettings(_Settings):
         if self.semi_axis_factor[0] > self.semi_axis_factor[1]:
             raise ValueError("semi_axis_factor: the first number is above the second")
         return self
+
+
+class InsidePathSettings(_ObjectSettings):
+    """Objects, placed uniformly inside the path."""
+
+    kind: Literal["inside_path"]
+    margin_m: NotNegative
+    """Least distance of the centres from the sides of the path."""
+    height_sigma_m: NotNegative
+
+
+class OnTableSettings(_ObjectSettings):
+    """Objects, placed uniformly on or above a table top at z = 0 around the origin."""
+
+    kind: Literal["on_table"]
+    length_m: Positive
+    """Along x, where the centres may be."""
+    width_m: Positive
+    """Along y, likewise."""
+    lift_max_m: NotNegative
+    """The lowest point of an object is above the table by a height uniform from 0 to this."""
+
+
+WorldSettings = InsidePathSettings | OnTableSettings
 
 
 class DetectorSettings(_Settings):
@@ -84,15 +129,27 @@ class DetectorSettings(_Settings):
     """Which one: any, or the one whose centre is nearest ("structured")."""
 
 
-class OdometrySettings(_Settings):
+class PlanarOdometrySettings(_Settings):
     """Noise of the measured (v, omega) per step."""
 
+    kind: Literal["planar"]
     translation_sigma_m: Positive
     rotation_sigma_rad: Positive
     turn_rotation_sigma_rad: Positive
     """On the steps of a turn."""
     lateral_sigma_m: Positive
     """What the covariance says of sideways motion; none is simulated."""
+
+
+class SpatialOdometrySettings(_Settings):
+    """Noise of the measured motion in space per step, per axis."""
+
+    kind: Literal["spatial"]
+    translation_sigma_m: Positive
+    rotation_sigma_rad: Positive
+
+
+OdometrySettings = PlanarOdometrySettings | SpatialOdometrySettings
 
 
 class RelativePositionSettings(_Settings):
@@ -106,12 +163,21 @@ class Scenario(_Settings):
     """Everything that a simulated recording is made from, except the seed."""
 
     objects: ObjectKind
-    path: PathSettings
+    path: Annotated[PathSettings, Field(discriminator="kind")]
     camera: CameraSettings
-    world: WorldSettings
+    world: Annotated[WorldSettings, Field(discriminator="kind")]
     detector: DetectorSettings
-    odometry: OdometrySettings
+    odometry: Annotated[OdometrySettings, Field(discriminator="kind")]
     relative_position: RelativePositionSettings
+
+    @model_validator(mode="after")
+    def _odometry_fits_path(self) -> Self:
+        fitting = "planar" if self.path.kind == "rounded_rectangle" else "spatial"
+        if self.odometry.kind != fitting:
+            raise ValueError(
+                f"odometry.kind: expected {fitting!r} with path.kind {self.path.kind!r}"
+            )
+        return self
 
 
 def load_scenario(source: str | Path) -> Scenario:
@@ -138,9 +204,15 @@ def load_scenario(source: str | Path) -> Scenario:
 
 def _in_one_line(error: ValidationError) -> str:
     return "; ".join(
-        f"{'.'.join(map(str, item['loc']))}: {item['msg']}".removeprefix(": ")
-        for item in error.errors()
+        f"{_name(item['loc'])}: {item['msg']}".removeprefix(": ") for item in error.errors()
     )
+
+
+def _name(location: tuple[int | str, ...]) -> str:
+    """Name a setting as in the file: without the kind that follows the name of its section."""
+    section, setting = location[:1], location[1:]
+    has_kind = section and section[0] in ("path", "world", "odometry")
+    return ".".join(map(str, section + (setting[1:] if has_kind else setting)))
 
 
 def _folders() -> list[Path]:

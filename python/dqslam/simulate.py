@@ -10,8 +10,9 @@ from dqslam import _core
 from dqslam._checks import Bools, Floats
 from dqslam._core import Camera, PoseModel
 from dqslam.detector import associate, cut_at_border, is_detected
-from dqslam.recording import Detections, Odometry, Recording, RelativePositions, Truth
-from dqslam.scenario import CameraSettings, PathSettings, Scenario
+from dqslam.motion import Motion, measure_odometry, move
+from dqslam.recording import Detections, Recording, RelativePositions, Truth
+from dqslam.scenario import CameraSettings, InsidePathSettings, OnTableSettings, Scenario
 
 # Axes of a level camera (x right, y down, z forward) on a mount (x forward, y left, z up).
 _MOUNT_FROM_CAMERA = [0.0, 0.0, 0.0, -0.5, 0.5, -0.5, 0.5]
@@ -27,23 +28,22 @@ class _World(NamedTuple):
 
 
 def simulate(scenario: Scenario, *, seed: int) -> tuple[Recording, Truth]:
-    """Drive through a world of objects and record odometry, boxes and relative positions.
+    """Move through a world of objects and record odometry, boxes and relative positions.
 
-    World, odometry, boxes, positions and wrong ids each have a random stream of their own, and
-    every pair of pose and object its own numbers: changing one setting leaves the others' noise as
-    it was. Objects are in the recording only if they were detected; the truth has all. Wrong are
+    World, odometry, boxes, positions, wrong ids and path each have a random stream of their own,
+    and every pair of pose and object its own numbers: changing one setting leaves the others' noise
+    as it was. Objects are in the recording only if they were detected; the truth has all. Wrong are
     the ids of boxes only; a relative position is always its object's.
     """
     if seed < 0:
         raise ValueError(f"seed: expected zero or more, got {seed}")
-    for_world, for_odometry, for_boxes, for_positions, for_ids = map(
-        default_rng, SeedSequence(seed).spawn(5)
+    for_world, for_odometry, for_boxes, for_positions, for_ids, for_path = map(
+        default_rng, SeedSequence(seed).spawn(6)
     )
     camera = _camera(scenario.camera)
-    relative, is_turn = _drive(scenario.path)
-    poses = _core.dead_reckon(PoseModel.SE2, np.zeros(3), relative)
-    world = _draw_world(scenario, poses, for_world)
-    truth = _truth(scenario, poses, world)
+    motion = move(scenario.path, for_path)
+    world = _draw_world(scenario, motion.poses, for_world)
+    truth = _truth(scenario, motion, world)
 
     box, in_front = _boxes(camera, truth, world)
     seen = np.argwhere(in_front & is_detected(box, camera, scenario.detector))
@@ -65,12 +65,12 @@ def simulate(scenario: Scenario, *, seed: int) -> tuple[Recording, Truth]:
     )
     has_box = np.isin(truth.object_id[object_row], detections.object_id)
     sigma = scenario.relative_position.sigma_m
-    in_robot = _in_robot(poses, world.center)
+    in_robot = _in_robot(motion, world.center)
     position_noise = for_positions.normal(0.0, sigma, size=in_robot.shape)
     recording = Recording(
         camera=camera,
-        timestamps=np.arange(len(poses), dtype=np.float64) * scenario.path.period_s,
-        odometry=_measure_odometry(scenario, poses[0], relative, is_turn, for_odometry),
+        timestamps=np.arange(len(motion.poses), dtype=np.float64) * scenario.path.period_s,
+        odometry=measure_odometry(motion, scenario.odometry, for_odometry),
         detections=detections,
         positions=RelativePositions(
             pose=pose[has_box],
@@ -101,43 +101,43 @@ def _camera(settings: CameraSettings) -> Camera:
     )
 
 
-def _drive(path: PathSettings) -> tuple[Floats, Bools]:
-    """Return the true motions (v, 0, omega), shape (n - 1, 3), and which steps turn.
-
-    The robot drives v forward, then turns by omega. Straight parts have the whole number of steps
-    that brings the rectangle nearest to its size.
-    """
-    turn = np.full(path.turn_steps, np.pi / 2.0 / path.turn_steps)
-    heading = np.cumsum(turn) - turn
-    along_sides = path.step_m * (np.cos(heading).sum() + np.sin(heading).sum())
-    straight = [round((side - along_sides) / path.step_m) for side in (path.length_m, path.width_m)]
-    if min(straight) < 0:
-        raise ValueError("path: the rectangle is too small for its turns")
-    half_lap = np.concatenate([np.zeros(straight[0]), turn, np.zeros(straight[1]), turn])
-    from_corner = np.tile(half_lap, 2 * path.laps)
-    omega = np.roll(from_corner, -round(path.start_fraction * straight[0]))
-    relative = np.column_stack([np.full(len(omega), path.step_m), np.zeros(len(omega)), omega])
-    return relative, omega != 0.0
-
-
 def _draw_world(scenario: Scenario, poses: Floats, random: Generator) -> _World:
-    """Place objects uniformly inside the path; every kind of object uses the same numbers."""
+    """Place objects uniformly; every kind of object uses the same numbers."""
     world = scenario.world
+    if isinstance(world, InsidePathSettings):
+        place = _inside_path(world, poses, random)
+    else:
+        place = _above_table(world, random)
+    side = random.normal(world.side_mean_m, world.side_sigma_m, size=world.object_count)
+    side = np.maximum(world.side_min_m, side)
+    yaw = random.uniform(-np.pi, np.pi, size=world.object_count)
+    factor = random.uniform(*world.semi_axis_factor, size=(world.object_count, 3))
+    semi_axes = factor * side[:, None] / 2.0
+    if isinstance(world, OnTableSettings):
+        place[:, 2] += side / 2.0 if scenario.objects == "cubes" else semi_axes[:, 2]
+    return _World(place, side, semi_axes, yaw)
+
+
+def _inside_path(world: InsidePathSettings, poses: Floats, random: Generator) -> Floats:
+    """Return centres, (o, 3)."""
     low = poses[:, :2].min(axis=0) + world.margin_m
     high = poses[:, :2].max(axis=0) - world.margin_m
     if (low > high).any():
         raise ValueError(f"world.margin_m: {world.margin_m} m leaves no room inside the path")
-    count = world.object_count
-    ground = random.uniform(low, high, size=(count, 2))
-    height = random.normal(0.0, world.height_sigma_m, size=(count, 1))
-    side = random.normal(world.side_mean_m, world.side_sigma_m, size=count)
-    side = np.maximum(world.side_min_m, side)
-    yaw = random.uniform(-np.pi, np.pi, size=count)
-    factor = random.uniform(*world.semi_axis_factor, size=(count, 3))
-    return _World(np.hstack([ground, height]), side, factor * side[:, None] / 2.0, yaw)
+    ground = random.uniform(low, high, size=(world.object_count, 2))
+    height = random.normal(0.0, world.height_sigma_m, size=(world.object_count, 1))
+    return np.hstack([ground, height])
 
 
-def _truth(scenario: Scenario, poses: Floats, world: _World) -> Truth:
+def _above_table(world: OnTableSettings, random: Generator) -> Floats:
+    """Return the points under the objects where they would rest, (o, 3)."""
+    size = np.array([world.length_m, world.width_m])
+    ground = random.uniform(-size / 2.0, size / 2.0, size=(world.object_count, 2))
+    lift = random.uniform(0.0, world.lift_max_m, size=(world.object_count, 1))
+    return np.hstack([ground, lift])
+
+
+def _truth(scenario: Scenario, motion: Motion, world: _World) -> Truth:
     count = len(world.center)
     if scenario.objects == "cubes":
         ellipsoids, volume = None, world.side**3
@@ -149,8 +149,8 @@ def _truth(scenario: Scenario, poses: Floats, world: _World) -> Truth:
         ellipsoids = np.array([_core.ellipsoid_from_axes(*row) for row in rows])
         volume = 4.0 / 3.0 * np.pi * world.semi_axes.prod(axis=1)
     return Truth(
-        pose_model=PoseModel.SE2,
-        poses=poses,
+        pose_model=motion.pose_model,
+        poses=motion.poses,
         object_id=np.arange(count),
         center=world.center,
         volume=volume,
@@ -162,10 +162,10 @@ def _truth(scenario: Scenario, poses: Floats, world: _World) -> Truth:
 def _boxes(camera: Camera, truth: Truth, world: _World) -> tuple[Floats, Bools]:
     """Return the exact boxes of all objects from all poses, (n, o, 4), and which are in front."""
     if truth.ellipsoids is None:
-        return _cube_boxes(camera, truth.poses, world)
+        return _cube_boxes(camera, truth, world)
     poses, objects = len(truth.poses), len(truth.center)
     box, in_front = _core.project_to_boxes(
-        PoseModel.SE2,
+        truth.pose_model,
         camera,
         np.repeat(truth.poses, objects, axis=0),
         np.tile(truth.ellipsoids, (poses, 1)),
@@ -173,13 +173,13 @@ def _boxes(camera: Camera, truth: Truth, world: _World) -> tuple[Floats, Bools]:
     return box.reshape(poses, objects, 4), in_front.reshape(poses, objects)
 
 
-def _cube_boxes(camera: Camera, poses: Floats, world: _World) -> tuple[Floats, Bools]:
+def _cube_boxes(camera: Camera, truth: Truth, world: _World) -> tuple[Floats, Bools]:
     """Bound the projected corners of cubes."""
     from scipy.spatial.transform import Rotation
 
     turned = Rotation.from_rotvec(np.outer(world.yaw, _UP)).as_matrix() @ _CORNERS.T  # (o, 3, 8)
     corners = world.center[:, :, None] + world.side[:, None, None] * turned
-    world_from_camera = _core.world_from_camera(PoseModel.SE2, camera, poses)
+    world_from_camera = _core.world_from_camera(truth.pose_model, camera, truth.poses)
     rotation = Rotation.from_quat(world_from_camera[:, 3:]).as_matrix()
     from_camera = corners[None] - world_from_camera[:, None, :3, None]  # (n, o, 3, 8)
     x, y, z = np.moveaxis(np.einsum("nji,nojc->noic", rotation, from_camera), 2, 0)
@@ -189,34 +189,12 @@ def _cube_boxes(camera: Camera, poses: Floats, world: _World) -> tuple[Floats, B
     return np.stack([u.min(2), v.min(2), u.max(2), v.max(2)], axis=2), in_front
 
 
-def _measure_odometry(
-    scenario: Scenario, first_pose: Floats, relative: Floats, is_turn: Bools, random: Generator
-) -> Odometry:
-    """Add noise to (v, omega) and say how large it is."""
+def _in_robot(motion: Motion, center: Floats) -> Floats:
+    """Return the objects' centres in the frames of all robots, metres, shape (n, o, 3)."""
     from scipy.spatial.transform import Rotation
 
-    noise = scenario.odometry
-    sigma = np.column_stack(
-        [
-            np.full(len(relative), noise.translation_sigma_m),
-            np.full(len(relative), noise.lateral_sigma_m),
-            np.where(is_turn, noise.turn_rotation_sigma_rad, noise.rotation_sigma_rad),
-        ]
-    )
-    error = sigma * random.normal(size=sigma.shape) * [1.0, 0.0, 1.0]  # nothing sideways
-    measured = relative + error
-    # The error is along the axes of the previous pose; the covariance belongs to those of the next.
-    next_from_previous = Rotation.from_rotvec(np.outer(-measured[:, 2], _UP)).as_matrix()
-    covariance = np.einsum("nij,nj,nkj->nik", next_from_previous, sigma**2, next_from_previous)
-    return Odometry(PoseModel.SE2, first_pose, measured, covariance)
-
-
-def _in_robot(poses: Floats, center: Floats) -> Floats:
-    """Return the objects' centres in the frames of all robots, metres, shape (n, o, 3)."""
-    poses_count, objects = len(poses), len(center)
-    on_ground = np.column_stack([center[:, :2], np.zeros(objects)])
-    in_robot = _core.between(
-        PoseModel.SE2, np.repeat(poses, objects, axis=0), np.tile(on_ground, (poses_count, 1))
-    )
-    in_robot[:, 2] = np.tile(center[:, 2], poses_count)  # the robot's z axis is the world's
-    return in_robot.reshape(poses_count, objects, 3)
+    in_place = Camera(1.0, 1.0, 0.0, 0.0, 1, 1)  # its frame is the robot's
+    world_from_robot = _core.world_from_camera(motion.pose_model, in_place, motion.poses)
+    rotation = Rotation.from_quat(world_from_robot[:, 3:]).as_matrix()
+    from_robot = center[None] - world_from_robot[:, None, :3]
+    return np.asarray(np.einsum("nji,noj->noi", rotation, from_robot))

@@ -25,7 +25,6 @@ def test_the_papers_values():
     assert scenario.world.height_sigma_m == 0.3
     sides = (scenario.world.side_mean_m, scenario.world.side_sigma_m, scenario.world.side_min_m)
     assert sides == (0.5, 0.3, 0.2)
-    assert (scenario.detector.truncation, scenario.detector.wrong_associations) == ("discard", 0.0)
     assert (scenario.detector.min_side_px, scenario.detector.edge_sigma_px) == (100.0, 1.0)
     odometry = scenario.odometry
     assert (odometry.translation_sigma_m, odometry.rotation_sigma_rad) == (0.02, 0.02)
@@ -55,9 +54,8 @@ def test_objects_can_be_chosen(tmp_path):
         ("start_fraction = 0.5", "start_fraction = 1.5", r"path\.start_fraction: .* less than"),
         ("sigma_m = 0.1   ", "sigma_m = -0.1   ", r"relative_position\.sigma_m: .* greater than 0"),
         ("[0.8, 1.4]", "[1.4, 0.8]", r"world: .*semi_axis_factor: the first number is above"),
-        ('"discard"', '"cut"', r"detector\.truncation: Input should be 'discard' or 'clip'"),
-        ('"random"', '"swap"', r"wrong_association_kind: .*'random' or 'structured'"),
-        ("ciations = 0.0", "ciations = 0.5", r"detector\.wrong_associations: .* equal to 0\.4"),
+        ('kind = "inside_path"', 'kind = "on_moon"', r"world: Input tag 'on_moon' .*'on_table'"),
+        ('kind = "rounded_rectangle"', "", r"path: Unable to extract tag using discriminator"),
         ("[world]", "[wrld]", r"world: Field required; wrld: Extra inputs"),
         ("[path]", "[path", r"not a TOML file: .*line"),
     ],
@@ -74,3 +72,13 @@ def test_what_is_wrong_is_named_on_one_line(tmp_path, old, new, message):
 def test_a_missing_scenario_lists_those_there_are(name):
     with pytest.raises(FileNotFoundError, match=rf"{name}: no such scenario.*: .*\bpaper\b"):
         load_scenario(name)
+
+
+def test_odometry_is_of_the_paths_kind(tmp_path):
+    orbit = (PAPER.parent / "orbit.toml").read_text()
+    path = tmp_path / "mixed.toml"
+    paper_odometry = PAPER.read_text().partition("[odometry]")[2].partition("[")[0]
+    before, _, after = orbit.partition("[odometry]")
+    path.write_text(before + "[odometry]" + paper_odometry + "[" + after.partition("[")[2])
+    with pytest.raises(ValueError, match=r"odometry\.kind: expected 'spatial' with path.kind 'orb"):
+        load_scenario(path)

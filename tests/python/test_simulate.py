@@ -158,7 +158,7 @@ def test_a_cubes_box_bounds_its_corners():
         semi_axes=np.ones((3, 3)),
         yaw=np.array([0.3, -2.0, 0.0]),
     )
-    boxes, in_front = _cube_boxes(recording.camera, truth.poses[:40], world)
+    boxes, in_front = _cube_boxes(recording.camera, truth, world)
     for pose in range(40):
         for row in range(3):
             corners = oracle.cube_corners(world.center[row], world.side[row], world.yaw[row])
