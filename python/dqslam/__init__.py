@@ -1,7 +1,9 @@
 """Object SLAM with dual quadrics: a Ceres core, driven from Python."""
 
 from dqslam._core import Camera as Camera
+from dqslam._core import Loss as Loss
 from dqslam._core import PoseModel as PoseModel
+from dqslam._core import ScenePriors as ScenePriors
 from dqslam._core import SolveOptions as SolveOptions
 from dqslam._core import Summary as Summary
 from dqslam.estimate import Estimate as Estimate
@@ -15,7 +17,6 @@ from dqslam.io import save_estimate as save_estimate
 from dqslam.plot import plot_maps as plot_maps
 from dqslam.problem import BoxNoise as BoxNoise
 from dqslam.problem import Graph as Graph
-from dqslam.problem import SizePrior as SizePrior
 from dqslam.problem import build_graph as build_graph
 from dqslam.problem import solve as solve
 from dqslam.recording import Detections as Detections
@@ -26,3 +27,6 @@ from dqslam.recording import Truth as Truth
 from dqslam.scenario import Scenario as Scenario
 from dqslam.scenario import load_scenario as load_scenario
 from dqslam.simulate import simulate as simulate
+from dqslam.size_prior import SizePrior as SizePrior
+from dqslam.size_prior import SizePriors as SizePriors
+from dqslam.size_prior import load_size_priors as load_size_priors

@@ -1,6 +1,7 @@
 """What an estimator answers: plain data."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -37,6 +38,10 @@ class Estimate:
     """q1 .. q9 with Q*(4,4) = 1, shape (o, 9)."""
     ellipsoids: Floats
     """Centre and log-Cholesky shape, shape (o, 9); rows of NaN where q is no ellipsoid."""
+    inliers: Bools = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
+    """Whether each box fits, chi-square at most `outlier_chi_square`; shape (b,)."""
+    dropped: Mapping[int, str] = field(default_factory=dict)
+    """Ids of the objects that were not mapped, and why."""
 
     @property
     def centers(self) -> Floats:

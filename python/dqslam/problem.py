@@ -5,9 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from dqslam import _core
-from dqslam._checks import Floats, Ints, as_floats, reject_rows
+from dqslam._checks import Bools, Floats, Ints, as_floats, reject_rows
 from dqslam.estimate import Estimate
 from dqslam.recording import Detections, Recording, RelativePositions
+from dqslam.size_prior import SizePrior, SizePriors
 
 
 @dataclass(frozen=True)
@@ -34,14 +35,8 @@ class BoxNoise:
         return np.asarray(variance[:, :, None] * np.eye(4))
 
 
-@dataclass(frozen=True)
-class SizePrior:
-    """How large objects are before any is seen: a log-normal semi-axis, broad on purpose."""
-
-    log_mean: float = float(np.log(0.3))
-    """Log of the median semi-axis in metres."""
-    log_sigma: float = 0.7
-    """Sigma of the log."""
+# Two boxes do not tell an object's distance from its size.
+FEWEST_INLIER_VIEWS = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,20 +58,30 @@ def build_graph(
     recording: Recording,
     *,
     box_noise: BoxNoise | None = None,
-    size_prior: SizePrior | None = None,
+    size_prior: SizePrior | SizePriors | None = None,
+    scene_priors: _core.ScenePriors | None = None,
 ) -> Graph:
     """Lay out a recording as a least-squares problem that starts from dead reckoning.
+
+    Parameters
+    ----------
+    box_noise, size_prior
+        What is assumed of boxes and objects; a table of size priors has one per class.
+    scene_priors
+        What is known of the scene, by default nothing: that objects are upright, or stand on the
+        ground, or how high the camera is.
 
     Raises
     ------
     ValueError
         When there are no boxes, one has no object id, a relative position belongs to an object
-        without boxes, or the core refuses the problem.
+        without boxes, a size prior to a class without boxes, or the core refuses the problem.
     """
     box_noise = BoxNoise() if box_noise is None else box_noise
-    size_prior = SizePrior() if size_prior is None else size_prior
     odometry, detections = recording.odometry, recording.detections
     object_ids, box_object, observations = _objects(detections)
+    class_names = _class_names(detections, box_object, len(object_ids))
+    priors = _size_priors(size_prior, class_names, detections)
     steps = np.arange(len(odometry.relative))
     core = _core.Graph(
         odometry.pose_model,
@@ -92,42 +97,78 @@ def build_graph(
         box_object=box_object,
         boxes=detections.box,
         box_covariance=_flat(box_noise.covariance(detections.box)),
-        log_size_mean=np.full(len(object_ids), size_prior.log_mean),
-        log_size_sigma=np.full(len(object_ids), size_prior.log_sigma),
+        box_truncated=detections.truncated,
+        log_size_mean=np.array([prior.log_mean for prior in priors]),
+        log_size_sigma=np.array([prior.log_sigma for prior in priors]),
+        scene_priors=_core.ScenePriors() if scene_priors is None else scene_priors,
         **_position_arrays(recording.positions, object_ids),
     )
     return Graph(
         core=core,
         timestamps=recording.timestamps,
         object_ids=object_ids,
-        class_names=_class_names(detections, box_object, len(object_ids)),
+        class_names=class_names,
         observations=observations,
     )
 
 
 def solve(
-    graph: Graph, options: _core.SolveOptions | None = None
+    graph: Graph,
+    options: _core.SolveOptions | None = None,
+    *,
+    start: _core.State | None = None,
 ) -> tuple[Estimate, _core.Summary]:
-    """Estimate poses and objects; the options default to the core's.
+    """Estimate poses and objects, from odometry or a given start; options default to the core's.
 
-    Objects that the landmark model left as no ellipsoid have NaN in `Estimate.ellipsoids`.
+    Objects that the landmark model left as no ellipsoid have NaN in `Estimate.ellipsoids`. With a
+    robust loss, objects that too few boxes fit are not in the estimate but in `Estimate.dropped`.
     """
-    solution = _core.solve(graph.core, _core.SolveOptions() if options is None else options)
+    options = _core.SolveOptions() if options is None else options
+    solution = _core.solve(graph.core, options, start)
     initial_poses = graph.core.initial_poses
     dual_quadrics = as_floats("solution.dual_quadrics", solution.dual_quadrics, [None, 9])
+    if options.landmark_model == _core.LandmarkModel.ELLIPSOID:
+        ellipsoids = as_floats("solution.landmarks", solution.landmarks, [None, 9])
+    else:
+        ellipsoids = np.array([_ellipsoid_or_nan(q) for q in dual_quadrics]).reshape(-1, 9)
+    views = _inlier_views(graph.core, solution.inliers)
+    kept = views >= (0 if options.loss == _core.Loss.NONE else FEWEST_INLIER_VIEWS)
     estimate = Estimate(
         pose_model=graph.core.pose_model,
         camera=graph.core.camera,
         timestamps=graph.timestamps,
         poses=as_floats("solution.poses", solution.poses, initial_poses.shape),
         initial_poses=initial_poses,
-        object_ids=graph.object_ids,
-        class_names=graph.class_names,
-        observations=graph.observations,
-        dual_quadrics=dual_quadrics,
-        ellipsoids=np.array([_ellipsoid_or_nan(q) for q in dual_quadrics]).reshape(-1, 9),
+        object_ids=graph.object_ids[kept],
+        class_names=tuple(np.array(graph.class_names)[kept].tolist()),
+        observations=graph.observations[kept],
+        dual_quadrics=dual_quadrics[kept],
+        ellipsoids=ellipsoids[kept],
+        inliers=solution.inliers,
+        dropped={
+            int(graph.object_ids[row]): f"seen in {views[row]} poses by boxes that fit, "
+            f"{FEWEST_INLIER_VIEWS} are needed"
+            for row in np.flatnonzero(~kept)
+        },
     )
     return estimate, solution.summary
+
+
+def _inlier_views(core: _core.Graph, inliers: Bools) -> Ints:
+    """Return from how many poses boxes that fit show each object, shape (o,)."""
+    pairs = np.column_stack([core.box_object, core.box_pose])[inliers]
+    seen = np.unique(pairs, axis=0)
+    return np.bincount(seen[:, 0], minlength=core.num_objects)
+
+
+def _size_priors(
+    given: SizePrior | SizePriors | None, class_names: tuple[str, ...], detections: Detections
+) -> list[SizePrior]:
+    """Return the prior of each object, by the names of their classes (o,)."""
+    if isinstance(given, SizePriors):
+        given.check_classes(set(detections.class_names.values()))
+        return [given.of(name) for name in class_names]
+    return [SizePrior() if given is None else given] * len(class_names)
 
 
 def _objects(detections: Detections) -> tuple[Ints, Ints, Ints]:

@@ -55,9 +55,10 @@ def test_trajectories_are_of_the_camera_not_the_robot(tmp_path):
 
 
 def test_map(tmp_path):
-    save_estimate(estimate(), tmp_path)
+    save_estimate(estimate(dropped={4: "too few"}), tmp_path)
     content = json.loads((tmp_path / "map.json").read_text())
-    assert list(content) == ["objects"]
+    assert list(content) == ["objects", "dropped"]
+    assert content["dropped"] == [{"id": 4, "reason": "too few"}]
     cup, tv = content["objects"]
     keys = "id class_name center semi_axes orientation_xyzw dual_quadric observations"
     assert list(cup) == list(tv) == keys.split()

@@ -9,11 +9,14 @@ from dqslam import (
     BoxNoise,
     Camera,
     Detections,
+    Loss,
     Odometry,
     PoseModel,
     Recording,
     RelativePositions,
+    ScenePriors,
     SizePrior,
+    SizePriors,
     SolveOptions,
     _core,
     build_graph,
@@ -77,6 +80,30 @@ def test_graph_arrays_by_hand():
     np.testing.assert_array_equal(core.log_size_sigma, [0.4, 0.4])
 
 
+def test_every_class_has_its_own_size_prior():
+    bowl = SizePrior(log_mean=-2.0, log_sigma=0.1)
+    other = SizePrior(log_mean=-1.0, log_sigma=0.9)
+    boxes = replace(recording().detections, object_id=[30, 20, 20])  # a bowl, a cup
+    graph = build_graph(
+        recording(detections=boxes), size_prior=SizePriors({"bowl": bowl}, default=other)
+    )
+    assert graph.class_names == ("cup", "bowl")
+    np.testing.assert_array_equal(graph.core.log_size_mean, [-1.0, -2.0])
+    np.testing.assert_array_equal(graph.core.log_size_sigma, [0.9, 0.1])
+
+
+def test_scene_priors_and_cut_edges_reach_the_core():
+    cut = [[False] * 4, [True, False, False, True], [False] * 4]
+    boxes = replace(recording().detections, truncated=cut)
+    known = ScenePriors(upright_sigma=0.02, support_sigma=0.05, plane_offset=-0.5)
+    core = build_graph(recording(detections=boxes), scene_priors=known).core
+    np.testing.assert_array_equal(core.box_truncated, cut)
+    priors = core.scene_priors
+    assert (priors.upright_sigma, priors.support_sigma, priors.plane_offset) == (0.02, 0.05, -0.5)
+    off = build_graph(recording()).core.scene_priors
+    assert (off.upright_sigma, off.support_sigma, off.camera_height_sigma) == (0.0, 0.0, 0.0)
+
+
 def test_an_objects_class_is_the_one_most_of_its_boxes_have():
     boxes = replace(
         recording().detections,
@@ -114,6 +141,11 @@ def position_without_box():
         (recording, {"box_noise": BoxNoise(pixels=0.0)}, "box noise: expected positive, finite"),
         (recording, {"box_noise": BoxNoise(pixels=np.nan)}, "box noise: expected positive, finite"),
         (recording, {"box_noise": BoxNoise(relative=-0.1)}, "box noise: relative is negative"),
+        (
+            recording,
+            {"size_prior": SizePriors({"vase": SizePrior()})},
+            "size priors: no class 'vase' in the recording, only: bowl, cup",
+        ),
         (recording, {"size_prior": SizePrior(log_sigma=0.0)}, "log_size_sigma"),
         (recording, {"size_prior": SizePrior(log_mean=np.inf)}, "log_size_mean"),
     ],
@@ -168,6 +200,54 @@ def test_the_estimate_explains_the_boxes():
             oracle.ellipsoid_surface(*axes),
         )
         np.testing.assert_allclose(box, recording.detections.box[row], atol=0.05)
+
+
+def test_ellipsoids_far_from_the_origin_keep_their_digits():
+    """The dual quadric holds c c^T - S: at 10^6 m nothing is left of the shape in it."""
+    recording, truth = noise_free()
+    away = np.array([1e6, -2e6, 0.0])
+    odometry = replace(recording.odometry, first_pose=truth.poses[0] + away)
+    estimate, _ = solve(build_graph(replace(recording, odometry=odometry), **NO_PRIOR))
+    for row in range(4):
+        _, axes, _ = _core.axes_from_ellipsoid(estimate.ellipsoids[row])
+        _, true_axes, _ = _core.axes_from_ellipsoid(truth.ellipsoids[row])
+        np.testing.assert_allclose(axes, true_axes, atol=1e-4)
+
+
+def test_boxes_that_fit_are_told_from_those_that_do_not():
+    recording, _ = noise_free()
+    box = recording.detections.box.copy()
+    box[[10, 50, 90]] += [0.0, 60.0, 0.0, 60.0]  # which no motion on the plane explains
+    moved = replace(recording, detections=replace(recording.detections, box=box))
+    graph = build_graph(moved, **NO_PRIOR | {"box_noise": BoxNoise(2.0, 0.0)})
+    estimate, _ = solve(graph, SolveOptions(loss=Loss.CAUCHY))
+    np.testing.assert_array_equal(np.flatnonzero(~estimate.inliers), [10, 50, 90])
+    assert estimate.dropped == {}
+
+
+def test_an_object_that_too_few_boxes_fit_is_dropped_with_a_robust_loss_only():
+    recording, _ = noise_free()
+    detections = recording.detections
+    last = np.flatnonzero(detections.object_id == detections.object_id.max())
+    few = np.ones(len(detections), dtype=bool)
+    few[last[2:]] = False
+    part = replace(recording, detections=detections.select(few))
+    graph = build_graph(part, **NO_PRIOR | {"size_prior": SizePrior(-1.0, 0.5)})
+    assert len(solve(graph)[0].object_ids) == 4
+    estimate, _ = solve(graph, SolveOptions(loss=Loss.CAUCHY))
+    gone = int(detections.object_id[last[0]])
+    assert estimate.dropped == {gone: "seen in 2 poses by boxes that fit, 3 are needed"}
+    assert estimate.object_ids.tolist() == [one for one in graph.object_ids if one != gone]
+    assert len(estimate.ellipsoids) == len(estimate.class_names) == len(estimate.observations) == 3
+
+
+def test_a_solve_can_start_where_another_ended():
+    recording, truth = noise_free()
+    graph = build_graph(recording, **NO_PRIOR)
+    start = _core.State(truth.poses, truth.ellipsoids)
+    estimate, summary = solve(graph, SolveOptions(max_iterations=3), start=start)
+    assert summary.initial_cost < 1e-9
+    np.testing.assert_allclose(estimate.poses, truth.poses, atol=1e-9)
 
 
 def test_same_recording_same_bits():

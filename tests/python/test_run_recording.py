@@ -1,4 +1,5 @@
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -6,15 +7,17 @@ import pytest
 from dqslam import _core
 from dqslam.evaluate import absolute_trajectory_error, center_errors
 from dqslam.io import FileError, OdometryNoise, Trajectory, load_recording, nearest_pose
-from dqslam.problem import BoxNoise
+from dqslam.problem import BoxNoise, build_graph, solve
 from dqslam.run_recording import (
-    CutBoxNoise,
     box_chi2,
     cut_edges,
+    default_options,
     perturb_odometry,
     run,
     scene_size_prior,
+    with_cut_edges,
 )
+from dqslam.size_prior import SizePrior, SizePriors
 from orbit import CAMERA, NAMES, make_orbit, write_orbit
 
 NOISE = OdometryNoise(translation_m=0.01, rotation_rad=0.01)
@@ -323,13 +326,53 @@ def test_edges_on_the_border_are_told_from_edges_inside():
     np.testing.assert_array_equal(cut_edges(lens, undistorted), expected[:2])
 
 
-def test_cut_edges_weigh_nothing_and_others_as_before():
-    camera = _core.Camera(500, 500, 320, 240, 640, 480)
-    box = np.array([[-0.5, 10.0, 50.0, 110.0], [100.0, 100.0, 200.0, 180.0]])
-    variance = np.diagonal(CutBoxNoise(camera=camera).covariance(box), axis1=1, axis2=2)
-    usual = np.diagonal(BoxNoise().covariance(box), axis1=1, axis2=2)
-    assert variance[0, 0] == 640**2
-    np.testing.assert_array_equal(variance.ravel()[1:], usual.ravel()[1:])
+def test_edges_on_the_border_are_flagged_beside_those_that_were(files):
+    recording, _ = load_recording(*files)
+    box = recording.detections.box.copy()
+    box[7, 2] = recording.camera.width - 0.5
+    given = np.zeros(box.shape, dtype=bool)
+    given[3, 1] = True
+    boxes = replace(recording.detections, box=box, truncated=given)
+    flagged = with_cut_edges(replace(recording, detections=boxes)).detections
+    np.testing.assert_array_equal(np.argwhere(flagged.truncated), [[3, 1], [7, 2]])
+
+
+def test_a_cut_edge_fits_when_the_object_reaches_it(files):
+    recording, _ = load_recording(*files)
+    estimate = run(recording, mode=_core.Mode.MAPPING).estimate
+    noise = BoxNoise(pixels=0.5, relative=0.0)
+    left = np.tile([True, False, False, False], (len(recording.detections), 1))
+    for inwards_px, is_reached in ((5.0, True), (-5.0, False)):
+        box = recording.detections.box + np.array([inwards_px, 0.0, 0.0, 0.0])
+        whole = replace(recording.detections, box=box)
+        chi2 = box_chi2(estimate, whole, noise)
+        cut_chi2 = box_chi2(estimate, replace(whole, truncated=left), noise)
+        gone = chi2 - cut_chi2
+        assert np.median(gone) == pytest.approx(100.0 if is_reached else 0.0, rel=0.1)
+
+
+def test_boxes_of_a_dropped_object_do_not_fit(files):
+    recording, _ = load_recording(*files)
+    estimate = run(recording, mode=_core.Mode.MAPPING).estimate
+    part = replace(
+        estimate,
+        object_ids=estimate.object_ids[:-1],
+        ellipsoids=estimate.ellipsoids[:-1],
+        dual_quadrics=estimate.dual_quadrics[:-1],
+    )
+    chi2 = box_chi2(part, recording.detections, BoxNoise())
+    is_last = recording.detections.object_id == estimate.object_ids[-1]
+    np.testing.assert_array_equal(np.isinf(chi2), is_last)
+
+
+def test_size_priors_of_classes_are_reported_and_checked(files):
+    recording, _ = load_recording(*files)
+    broad = SizePrior(np.log(0.1), 0.7)
+    result = run(recording, size_prior=SizePriors({"cup": SizePrior(np.log(0.05), 0.2)}, broad))
+    assert result.report["size_prior"]["classes"]["cup"]["median_m"] == pytest.approx(0.05)
+    assert result.report["dropped_objects"] == {}
+    with pytest.raises(ValueError, match=r"no class 'sofa' in the recording, only: .*cup"):
+        run(recording, size_prior=SizePriors({"sofa": broad}))
 
 
 def test_boxes_cut_by_the_image_do_not_bend_the_map(tmp_path):
@@ -351,13 +394,15 @@ def test_boxes_cut_by_the_image_do_not_bend_the_map(tmp_path):
     recording, _ = load_recording(*files)
     true = np.array([orbit.centers[name] for name in NAMES])
 
-    def worst(noise):
-        result = run(recording, mode=_core.Mode.MAPPING, box_noise=noise)
-        return np.linalg.norm(result.estimate.centers - true, axis=1).max()
+    def worst(found):
+        return np.linalg.norm(found.centers - true, axis=1).max()
 
-    blind = worst(BoxNoise())
-    assert worst(None) < 0.01
-    assert worst(None) < 0.5 * blind
+    aware = run(recording, mode=_core.Mode.MAPPING).estimate
+    prior = scene_size_prior(recording)
+    options = default_options(_core.Mode.MAPPING, _core.Schedule.BATCH)
+    blind, _ = solve(build_graph(recording, size_prior=prior), options)
+    assert worst(aware) < 0.01
+    assert worst(aware) < 0.5 * worst(blind)
 
 
 def test_reference_in_another_frame_and_rate(files, orbit):

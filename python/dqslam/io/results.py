@@ -15,7 +15,7 @@ def save_estimate(estimate: Estimate, directory: str | Path) -> None:
     """Write an estimate into a directory, which is made if need be.
 
     ``trajectory.txt`` has the estimated and ``odometry.txt`` the initial poses, world_from_camera;
-    ``map.json`` has the objects. Each file is complete or absent.
+    ``map.json`` has the objects, and why others were dropped. Each file is complete or absent.
     """
     directory = Path(directory)
     paths = {"trajectory.txt": estimate.poses, "odometry.txt": estimate.initial_poses}
@@ -23,7 +23,8 @@ def save_estimate(estimate: Estimate, directory: str | Path) -> None:
         cameras = _core.world_from_camera(estimate.pose_model, estimate.camera, poses)
         write_trajectory(directory / name, estimate.timestamps, cameras)
     objects = [_object(estimate, row) for row in range(len(estimate.object_ids))]
-    write_json(directory / "map.json", {"objects": objects})
+    dropped = [{"id": number, "reason": reason} for number, reason in estimate.dropped.items()]
+    write_json(directory / "map.json", {"objects": objects, "dropped": dropped})
 
 
 def _object(estimate: Estimate, row: int) -> dict[str, Any]:

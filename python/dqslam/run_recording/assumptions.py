@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dqslam import _core
-from dqslam.problem import BoxNoise, SizePrior
 from dqslam.recording import Recording
+from dqslam.size_prior import SizePrior
 
 # Detectors stop short of the image border by a pixel or two.
 BORDER_PX = 3.0
@@ -18,23 +18,11 @@ TRACK_LENGTH = 10
 LOG_SIZE_SIGMA = 0.7
 
 
-@dataclass(frozen=True)
-class CutBoxNoise(BoxNoise):
-    """Box noise where boxes end at the image: such an edge says nothing about the object.
-
-    Its sigma is the size of the image, in place of the detector's.
-    """
-
-    camera: _core.Camera | None = None
-
-    def covariance(self, box: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the covariance [px^2] of u_min, v_min, u_max, v_max, shape (b, 4, 4)."""
-        covariance = super().covariance(box)
-        if self.camera is not None:
-            size = float(max(self.camera.width, self.camera.height))
-            row, edge = np.nonzero(cut_edges(self.camera, box))
-            covariance[row, edge, edge] = size**2
-        return covariance
+def with_cut_edges(recording: Recording) -> Recording:
+    """Flag the edges of boxes that lie on the border of the image: the object may go on beyond."""
+    detections = recording.detections
+    truncated = detections.truncated | cut_edges(recording.camera, detections.box)
+    return replace(recording, detections=replace(detections, truncated=truncated))
 
 
 def cut_edges(camera: _core.Camera, box: NDArray[np.float64]) -> NDArray[np.bool_]:

@@ -10,16 +10,18 @@ import numpy as np
 from dqslam import _core
 from dqslam.estimate import Estimate
 from dqslam.io import OdometryNoise, Trajectory
-from dqslam.problem import BoxNoise, Graph, SizePrior, build_graph, solve
+from dqslam.problem import BoxNoise, Graph, build_graph, solve
 from dqslam.recording import Recording
-from dqslam.run_recording.assumptions import CutBoxNoise, scene_size_prior
+from dqslam.run_recording.assumptions import scene_size_prior, with_cut_edges
 from dqslam.run_recording.report import (
     box_chi2,
     describe_boxes,
     describe_objects,
+    describe_size_prior,
     describe_solver,
     trajectory_error,
 )
+from dqslam.size_prior import SizePrior, SizePriors
 
 GROW_STEPS = 60
 
@@ -77,10 +79,12 @@ def run(
     mode: _core.Mode = _core.Mode.SLAM,
     reference: Trajectory | None = None,
     box_noise: BoxNoise | None = None,
-    size_prior: SizePrior | None = None,
+    size_prior: SizePrior | SizePriors | None = None,
     options: _core.SolveOptions | None = None,
 ) -> RunResult:
     """Estimate poses and objects of a recording, and report.
+
+    Edges of boxes on the border of the image only bound the object from one side.
 
     Parameters
     ----------
@@ -89,9 +93,10 @@ def run(
     reference
         The trajectory to compare with, before and after; it may be in another world frame.
     box_noise, size_prior, options
-        What to assume; by default ``CutBoxNoise``, ``scene_size_prior``, ``default_options``.
+        What to assume; by default ``BoxNoise``, ``scene_size_prior``, ``default_options``.
     """
-    noise = box_noise or CutBoxNoise(camera=recording.camera)
+    noise = box_noise or BoxNoise()
+    recording = with_cut_edges(recording)
     prior = size_prior or scene_size_prior(recording)
     graph = build_graph(recording, box_noise=noise, size_prior=prior)
     if options is None:
@@ -106,7 +111,8 @@ def run(
         "boxes": describe_boxes(chi2),
         "objects": describe_objects(estimate, recording.detections, chi2),
         "box_noise": {"pixels": noise.pixels, "relative": noise.relative},
-        "size_prior": {"median_m": float(np.exp(prior.log_mean)), "log_sigma": prior.log_sigma},
+        "dropped_objects": {str(name): why for name, why in estimate.dropped.items()},
+        "size_prior": describe_size_prior(prior),
         "trajectory_error": None if reference is None else trajectory_error(estimate, reference),
         "solver": describe_solver(summary) | {"final_costs": costs},
     }

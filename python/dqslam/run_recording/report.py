@@ -13,6 +13,7 @@ from dqslam.evaluate import absolute_trajectory_error
 from dqslam.io import Trajectory, nearest_pose
 from dqslam.problem import BoxNoise
 from dqslam.recording import Detections
+from dqslam.size_prior import SizePrior, SizePriors
 
 # 99 % of the boxes of an object that is where the map says lie below this: chi-square, 4 dof.
 CHI2_GATE = 13.28
@@ -21,9 +22,15 @@ CHI2_GATE = 13.28
 def box_chi2(estimate: Estimate, detections: Detections, noise: BoxNoise) -> NDArray[np.float64]:
     """Compare boxes with the estimate: chi-square with 4 dof, shape (m,).
 
-    Infinite where the object is not in front of the camera that saw it, or no ellipsoid.
+    An edge that the image cut fits if the object reaches it. Infinite where the object is not in
+    front of the camera that saw it, no ellipsoid, or dropped.
     """
-    row = np.searchsorted(estimate.object_ids, detections.object_id)
+    if not len(estimate.object_ids):
+        return np.full(len(detections), np.inf)
+    row = np.searchsorted(estimate.object_ids, detections.object_id).clip(
+        max=len(estimate.object_ids) - 1
+    )
+    mapped = estimate.is_ellipsoid[row] & (estimate.object_ids[row] == detections.object_id)
     predicted, in_front = _core.project_to_boxes(
         estimate.pose_model,
         estimate.camera,
@@ -31,9 +38,11 @@ def box_chi2(estimate: Estimate, detections: Detections, noise: BoxNoise) -> NDA
         np.where(estimate.is_ellipsoid[:, None], estimate.ellipsoids, 1.0)[row],
     )
     error = predicted - detections.box
+    beyond = np.where(error * [-1.0, -1.0, 1.0, 1.0] > 0.0, 0.0, error)
+    error = np.where(detections.truncated, beyond, error)
     sigma = np.sqrt(np.diagonal(noise.covariance(detections.box), axis1=1, axis2=2))
     chi2 = np.sum((error / sigma) ** 2, axis=1)
-    return np.where(in_front & estimate.is_ellipsoid[row], chi2, np.inf)
+    return np.where(in_front & mapped, chi2, np.inf)
 
 
 def trajectory_error(estimate: Estimate, reference: Trajectory) -> dict[str, Any]:
@@ -102,6 +111,14 @@ def describe_objects(
         }
         for row, object_id in enumerate(estimate.object_ids)
     ]
+
+
+def describe_size_prior(prior: SizePrior | SizePriors) -> dict[str, Any]:
+    """Describe one prior, or the default of a table and its classes."""
+    if isinstance(prior, SizePriors):
+        classes = {name: describe_size_prior(one) for name, one in prior.classes.items()}
+        return describe_size_prior(prior.default) | {"classes": classes}
+    return {"median_m": float(np.exp(prior.log_mean)), "log_sigma": prior.log_sigma}
 
 
 def describe_solver(summary: _core.Summary) -> dict[str, Any]:

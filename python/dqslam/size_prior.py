@@ -1,0 +1,79 @@
+"""How large objects are before any is seen: one prior for all, or a table of one per class."""
+
+import tomllib
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+
+@dataclass(frozen=True)
+class SizePrior:
+    """A log-normal semi-axis, broad on purpose."""
+
+    log_mean: float = float(np.log(0.3))
+    """Log of the median semi-axis in metres."""
+    log_sigma: float = 0.7
+    """Sigma of the log."""
+
+
+@dataclass(frozen=True)
+class SizePriors:
+    """Size priors by the name of the class, and one for all other classes."""
+
+    classes: Mapping[str, SizePrior]
+    default: SizePrior = field(default_factory=SizePrior)
+
+    def of(self, class_name: str) -> SizePrior:
+        """Return the prior of a class."""
+        return self.classes.get(class_name, self.default)
+
+    def check_classes(self, known: Collection[str]) -> None:
+        """Raise a ValueError that names the first class which is not known, and those that are."""
+        for name in self.classes:
+            if name not in known:
+                names = ", ".join(sorted(known))
+                raise ValueError(f"size priors: no class {name!r} in the recording, only: {names}")
+
+
+class _Entry(BaseModel):
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+    median_m: Annotated[float, Field(gt=0.0)]
+    spread: Annotated[float, Field(gt=1.0)]
+
+    def prior(self) -> SizePrior:
+        return SizePrior(float(np.log(self.median_m)), float(np.log(self.spread)))
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+    default: _Entry | None = None
+    classes: dict[str, _Entry] = {}
+
+
+def load_size_priors(path: str | Path) -> SizePriors:
+    """Read a table of size priors from a TOML file.
+
+    It has a part ``[classes.NAME]`` for each class and may have one for all others, ``[default]``,
+    each with ``median_m``, the median semi-axis in metres, and ``spread``, a factor above 1: two
+    of three semi-axes are between median / spread and median * spread.
+
+    Raises
+    ------
+    FileNotFoundError
+        When there is no such file.
+    ValueError
+        When the file is no such table; names the file and every wrong setting.
+    """
+    try:
+        table = _Table.model_validate(tomllib.loads(Path(path).read_text(encoding="utf-8")))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ValueError(f"{path}: not a TOML file: {error}") from None
+    except ValidationError as error:
+        wrong = [f"{'.'.join(map(str, one['loc']))}: {one['msg']}" for one in error.errors()]
+        raise ValueError(f"{path}: {'; '.join(wrong)}") from None
+    classes = {name: entry.prior() for name, entry in table.classes.items()}
+    return SizePriors(classes, SizePrior() if table.default is None else table.default.prior())
