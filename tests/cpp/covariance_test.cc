@@ -1,0 +1,96 @@
+#include "dqslam/covariance.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "dqslam/solve.h"
+#include "scene.h"
+
+namespace dqslam {
+namespace {
+
+Eigen::MatrixXd Square(const RowMatrix& table, int row) {
+  const int size = static_cast<int>(std::lround(std::sqrt(table.cols())));
+  return Eigen::Map<const RowMatrix>(table.row(row).data(), size, size);
+}
+
+TEST(ComputeCovariance, FixesTheFirstPoseAndGrowsAlongOdometry) {
+  Scene scene = MakeScene<Se2>();
+  scene.graph.boxes = {
+      IndexVector(0), IndexVector(0), RowMatrix(0, 4), RowMatrix(0, 16), BoolTable(0, 4)};
+  scene.graph.size_prior = {Eigen::VectorXd(0), Eigen::VectorXd(0)};
+  State state{scene.truth.poses, RowMatrix(0, kLandmarkSize)};
+  const Covariance covariance = ComputeCovariance(scene.graph, SolveOptions(), state);
+  EXPECT_EQ(covariance.poses.row(0).norm(), 0);
+  // The first step: the covariance of odometry itself, 0.02 m and 0.02 rad.
+  EXPECT_LT((Square(covariance.poses, 1) - 4e-4 * Eigen::Matrix3d::Identity()).norm(), 1e-10);
+  // Heading: a random walk.
+  for (const int pose : {5, 20, 39}) {
+    EXPECT_NEAR(Square(covariance.poses, pose)(2, 2), 4e-4 * pose, 1e-8);
+  }
+  EXPECT_TRUE(covariance.under_constrained.empty());
+}
+
+// Halving all sigmas quarters all covariances: a wrong factor of two in any term would show.
+TEST(ComputeCovariance, ScalesWithTheNoise) {
+  Scene scene = MakeScene<Se3>();
+  const SolveOptions options;
+  const Covariance wide = ComputeCovariance(scene.graph, options, scene.truth);
+  scene.graph.boxes.covariance /= 4;
+  scene.graph.odometry.covariance /= 4;
+  const Covariance narrow = ComputeCovariance(scene.graph, options, scene.truth);
+  EXPECT_LT((wide.poses - 4 * narrow.poses).norm(), 1e-6 * wide.poses.norm());
+  EXPECT_LT((wide.objects - 4 * narrow.objects).norm(), 1e-6 * wide.objects.norm());
+}
+
+// Monte Carlo: the spread of estimates from noisy boxes is what the covariance says.
+TEST(ComputeCovariance, PredictsTheSpreadOfEstimates) {
+  constexpr int kRuns = 150;
+  Scene scene = MakeScene<Se2>();
+  SolveOptions options;
+  options.mode = Mode::kMapping;
+  const Covariance covariance = ComputeCovariance(scene.graph, options, scene.truth);
+  EXPECT_EQ(covariance.poses.norm(), 0);
+  const RowMatrix exact = scene.graph.boxes.box;
+  Random random(3);
+  double nees = 0;
+  for (int run = 0; run < kRuns; ++run) {
+    scene.graph.boxes.box =
+        exact + RowMatrix::NullaryExpr(
+                    exact.rows(), 4, [&](Eigen::Index, Eigen::Index) { return random.Normal(); });
+    const Solution solution = Solve(scene.graph, options, scene.truth);
+    for (int object = 0; object < scene.graph.num_objects(); ++object) {
+      const Eigen::Vector3d error =
+          (solution.landmarks.row(object) - scene.truth.landmarks.row(object)).head<3>();
+      const Eigen::Matrix3d centre = Square(covariance.objects, object).topLeftCorner<3, 3>();
+      nees += error.dot(centre.inverse() * error);
+    }
+  }
+  // Chi-square with 3 x 5 x 150 = 2250 degrees of freedom: 99.9 % within 10 % of its mean.
+  EXPECT_NEAR(nees / (3 * scene.graph.num_objects() * kRuns), 1, 0.1);
+}
+
+TEST(ComputeCovariance, NamesAnObjectThatNothingDeterminesAndReturnsTheRest) {
+  Scene scene = MakeScene<Se2>();
+  BoxTable& boxes = scene.graph.boxes;
+  int kept = 0;  // of object 2, one box remains; the prior is as good as none
+  for (int row = 0; row < boxes.size(); ++row) {
+    if (boxes.object[row] == 2 && kept++ > 0) boxes.object[row] = 1;
+  }
+  const Covariance covariance = ComputeCovariance(scene.graph, SolveOptions(), scene.truth);
+  ASSERT_EQ(covariance.under_constrained.size(), 1u);
+  EXPECT_THAT(covariance.under_constrained[0], testing::HasSubstr("object 2"));
+  EXPECT_TRUE(covariance.objects.row(2).hasNaN());
+  EXPECT_TRUE(covariance.objects.row(1).allFinite());
+  EXPECT_TRUE(covariance.poses.allFinite());
+}
+
+TEST(ComputeCovariance, RefusesAStateThatDoesNotFit) {
+  Scene scene = MakeScene<Se2>();
+  State state = scene.truth;
+  state.poses.conservativeResize(3, 3);
+  EXPECT_THROW(ComputeCovariance(scene.graph, SolveOptions(), state), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace dqslam
