@@ -44,11 +44,15 @@ struct Situation {
     return CostPointer(AlgebraicCost<Pose, Landmark>::Create(
         mount, BoxLines(camera, observed), weight, normalized));
   }
-  CostPointer Tangent(const Eigen::Matrix4d& weight, double depth = 4) const {
-    return CostPointer(TangentCost<Pose, Landmark>::Create(camera, mount, observed, weight, depth));
+  CostPointer Tangent(const Eigen::Matrix4d& weight,
+                      double depth = 4,
+                      const EdgeFlags& one_sided = EdgeFlags::Constant(false)) const {
+    return CostPointer(
+        TangentCost<Pose, Landmark>::Create(camera, mount, observed, weight, depth, one_sided));
   }
-  CostPointer Box(const Eigen::Matrix4d& weight) const {
-    return CostPointer(BoxCost<Pose, Landmark>::Create(camera, mount, observed, weight));
+  CostPointer Box(const Eigen::Matrix4d& weight,
+                  const EdgeFlags& one_sided = EdgeFlags::Constant(false)) const {
+    return CostPointer(BoxCost<Pose, Landmark>::Create(camera, mount, observed, weight, one_sided));
   }
   CostPointer Position(const Eigen::Matrix3d& weight) const {
     return CostPointer(
@@ -190,6 +194,32 @@ TYPED_TEST(BoxCosts, BoxIsTheSampledBoxMinusTheObserved) {
         oracle::Box(world.camera, world.view, world.ellipsoid) - world.observed;
     EXPECT_LT((ResidualOf(*world.Box(kPlain), world.Blocks()) - expected).norm(), 1e-6);
   }
+}
+
+// Left and bottom edge are cut by the border: beyond them the object may go on as it likes.
+TYPED_TEST(BoxCosts, OneSidedEdgesCountOnlyWhereTheObjectEndsInside) {
+  EdgeFlags one_sided;
+  one_sided << true, false, false, true;
+  const Eigen::Vector4d outward(-1, -1, 1, 1);
+  int beyond = 0;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    const typename TestFixture::World world(this->random_);
+    const Eigen::Vector4d box = ResidualOf(*world.Box(kPlain), world.Blocks());
+    const Eigen::Vector4d tangent = ResidualOf(*world.Tangent(kPlain), world.Blocks());
+    Eigen::Vector4d expected_box = box, expected_tangent = tangent;
+    for (const int edge : {0, 3}) {
+      if (outward[edge] * box[edge] <= 0) continue;
+      expected_box[edge] = expected_tangent[edge] = 0;
+      ++beyond;
+    }
+    EXPECT_EQ(ResidualOf(*world.Box(kPlain, one_sided), world.Blocks()), expected_box);
+    EXPECT_EQ(ResidualOf(*world.Tangent(kPlain, 4.0, one_sided), world.Blocks()), expected_tangent);
+    if (std::min(std::abs(box[0]), std::abs(box[3])) < 1) continue;  // a kink within the steps
+    ExpectJacobiansMatchPerturbation(*world.Box(kPlain, one_sided), world.Blocks());
+    ExpectJacobiansMatchPerturbation(*world.Tangent(kPlain, 4.0, one_sided), world.Blocks());
+  }
+  EXPECT_GT(beyond, 5);
+  EXPECT_LT(beyond, 2 * kTrials - 5);
 }
 
 // Behind, around and across the camera: box and normalised algebraic refuse, the others do not.

@@ -9,7 +9,7 @@
 namespace dqslam {
 namespace {
 
-constexpr int kTrials = 20;
+constexpr int kTrials = 10;
 constexpr double kSide = 5;  // metres from the camera to the object
 
 Camera MakeCamera() {
@@ -181,6 +181,18 @@ TEST(FitSvd, FewerThanThreeViewsThrow) {
   }
 }
 
+// Edges that the border cut may say anything.
+TEST(FitSvd, IgnoresTruncatedEdges) {
+  Random random(9);
+  const oracle::Ellipsoid e = RandomEllipsoid(random);
+  std::vector<View> views = GeneralMotion(random, e, 12);
+  for (size_t i = 0; i < views.size(); i += 2) {
+    views[i].truncated[i % 4] = true;
+    views[i].box[i % 4] = 320;
+  }
+  EXPECT_LT((FitSvd(MakeCamera(), views).quadric - QuadricOf(e)).norm(), 1e-8);
+}
+
 TEST(IdentityQuadric, IsTheIdentityMatrix) {
   EXPECT_EQ(DualQuadricMatrix(IdentityQuadric()), Eigen::Matrix4d(Eigen::Matrix4d::Identity()));
 }
@@ -204,6 +216,17 @@ TEST(BackProject, IsTheMeanOfItsViews) {
   }
   const Vector9d sphere = BackProject(MakeCamera(), {left, right}, {std::log(0.5), 0.6});
   EXPECT_LT((sphere - Sphere({1, 0, 10}, 0.5)).norm(), 1e-12);
+}
+
+// As in the first test, but the border left only half of the width.
+TEST(BackProject, TrustsTheSideThatTheBorderLeft) {
+  View view;
+  view.camera = {Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero()};
+  view.box << 310, 250 - 32.5, 310 + 35, 250 + 32.5;
+  view.sqrt_information.setIdentity();
+  view.truncated[0] = true;
+  const Vector9d sphere = BackProject(MakeCamera(), {view}, {std::log(0.5), 0.6});
+  EXPECT_NEAR(sphere[2], 10, 1e-12);
 }
 
 // A box as wide as the image would put the camera into the sphere.
@@ -231,6 +254,18 @@ TEST(FitSphere, IsExactForASphere) {
     const Vector9d straight = FitSphere(MakeCamera(), ConstantHeading(ball, 8), broad);
     EXPECT_LT((straight - expected).norm(), 1e-7);
   }
+}
+
+TEST(FitSphere, IgnoresTruncatedEdges) {
+  Random random(10);
+  const oracle::Ellipsoid ball{{0.1, 0.2, -0.1}, Eigen::Vector3d::Constant(0.5), {0, 0, 0, 1}};
+  std::vector<View> views = GeneralMotion(random, ball, 8);
+  for (size_t i = 0; i < views.size(); i += 2) {
+    views[i].truncated[i % 4] = true;
+    views[i].box[i % 4] += i % 4 < 2 ? 5 : -5;
+  }
+  const Vector9d sphere = FitSphere(MakeCamera(), views, {std::log(0.4), 1e6});
+  EXPECT_LT((sphere - Sphere(ball.center, 0.5)).norm(), 1e-7);
 }
 
 // An honest prior of 0.6 pulls the radius of a ball at twice the expected size by little.

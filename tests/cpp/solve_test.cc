@@ -126,6 +126,21 @@ TYPED_TEST(SolveOf, MappingRecoversObjectsAndLeavesPoses) {
   }
 }
 
+// A narrower image: boxes end at its border and say so.
+TYPED_TEST(SolveOf, RecoversTheTruthFromTruncatedBoxes) {
+  Graph graph = this->scene_.graph;
+  graph.camera.width = 381;
+  int truncated = 0;
+  for (int row = 0; row < graph.boxes.size(); ++row) {
+    if (graph.boxes.box(row, 2) <= 380.5 || graph.boxes.box(row, 0) > 350) continue;
+    graph.boxes.box(row, 2) = 380.5;
+    graph.boxes.truncated(row, 2) = true;
+    ++truncated;
+  }
+  EXPECT_GT(truncated, 10);
+  this->ExpectTruth(Solve(graph, this->options_, {}));
+}
+
 TYPED_TEST(SolveOf, SameInputGivesTheSameBits) {
   Graph graph = this->scene_.graph;
   Random random(6);
