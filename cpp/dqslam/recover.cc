@@ -9,7 +9,19 @@ namespace dqslam {
 namespace {
 
 constexpr double kImpossibleBox = 13.28;  // chi-square of 4 degrees of freedom, 99 %
-constexpr int kMaxRestarts = 4;
+constexpr int kMaxRestarts = 2;
+constexpr int kFewBoxes = 3;
+
+// Makes an attempt the state if it lowers the cost.
+bool KeepIfBetter(const State& attempt, const Summary& total, State* state, Summary* summary) {
+  const bool better = total.final_cost < summary->final_cost * (1 - 1e-9);
+  if (!better) return false;
+  *summary = total;
+  *state = attempt;
+  return true;
+}
+
+}  // namespace
 
 std::vector<bool> StuckObjects(const PreparedGraph& prepared, const SolveOptions& options,
                                const State& state) {
@@ -24,8 +36,6 @@ std::vector<bool> StuckObjects(const PreparedGraph& prepared, const SolveOptions
   }
   return stuck;
 }
-
-}  // namespace
 
 Stage BatchStage(const PreparedGraph& prepared, const SolveOptions& options) {
   Stage stage;
@@ -67,10 +77,23 @@ void RestartStuckObjects(const PreparedGraph& prepared, const SolveOptions& opti
     towards.minimizer = Minimizer::kLevenbergMarquardt;
     Append(Optimize(prepared, options, towards, monitor, &attempt), &total);
     Append(Optimize(prepared, options, all, monitor, &attempt), &total);
-    const bool better = total.final_cost < summary->final_cost * (1 - 1e-9);
-    *summary = better ? total : *summary;
-    if (!better) return;
-    *state = attempt;
+    if (!KeepIfBetter(attempt, total, state, summary)) return;
+  }
+}
+
+void TryOtherDepths(const PreparedGraph& prepared, const SolveOptions& options,
+                    const Monitor& monitor, State* state, Summary* summary) {
+  SolveOptions by_size = options;
+  by_size.start = Start::kSizePrior;
+  for (int object = 0; object < prepared.graph.num_objects(); ++object) {
+    const std::vector<int>& boxes = prepared.boxes_of_object[object];
+    if (static_cast<int>(boxes.size()) > kFewBoxes) continue;
+    State attempt = *state;
+    attempt.landmarks.row(object) = StartObject(prepared, by_size, attempt, object, boxes);
+    Summary total = *summary;
+    const Stage all = BatchStage(prepared, options);
+    Append(Optimize(prepared, options, all, monitor, &attempt), &total);
+    KeepIfBetter(attempt, total, state, summary);
   }
 }
 

@@ -1,5 +1,6 @@
 #include "dqslam/solve.h"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 
@@ -47,6 +48,12 @@ class Solver {
         monitor_(monitor),
         prepared_(graph, options.mode == Mode::kMapping) {}
 
+  /// Whether objects remain where their boxes say that they cannot be.
+  bool LeavesObjectsStuck(const State& state) const {
+    const std::vector<bool> stuck = StuckObjects(prepared_, options_, state);
+    return std::any_of(stuck.begin(), stuck.end(), [](bool is_stuck) { return is_stuck; });
+  }
+
   /// Of every object's linear fit at the initial poses; NaN where it has fewer than 3 views.
   RowMatrix SvdSingularValues() const {
     State state{graph_.initial_poses, RowMatrix()};
@@ -80,7 +87,10 @@ class Solver {
       return summary;
     }
     Append(Batch(BatchStage(prepared_, options_).residual, state), &summary);
-    if (Refines()) RestartStuckObjects(prepared_, options_, monitor_, state, &summary);
+    if (Refines()) {
+      RestartStuckObjects(prepared_, options_, monitor_, state, &summary);
+      TryOtherDepths(prepared_, options_, monitor_, state, &summary);
+    }
     return summary;
   }
 
@@ -116,6 +126,30 @@ class Solver {
   const PreparedGraph prepared_;
 };
 
+// Grows again in other steps where objects are stuck, up to two times, and keeps the lowest cost.
+// With a robust loss an object may well have outliers only: there it grows once.
+Summary SolveInAttempts(const Graph& graph, const SolveOptions& options,
+                        const std::optional<State>& start, const Monitor& monitor, State* state) {
+  const bool repeats = !start && options.mode == Mode::kSlam && options.loss == Loss::kNone &&
+                       options.schedule == Schedule::kGrow &&
+                       options.residual == Residual::kTangentThenBox;
+  SolveOptions variant = options;
+  Summary best;
+  for (int attempt = 0; attempt < (repeats ? 3 : 1); ++attempt) {
+    if (attempt == 1) variant.grow_poses = 2 * options.grow_poses;
+    if (attempt == 2) variant.grow_poses = (options.grow_poses + 1) / 2;
+    Solver solver(graph, variant, monitor);
+    State reached;
+    const Summary summary = solver.Run(start, &reached);
+    if (attempt == 0 || summary.final_cost < best.final_cost) {
+      best = summary;
+      *state = reached;
+    }
+    if (!repeats || !solver.LeavesObjectsStuck(*state)) break;
+  }
+  return best;
+}
+
 }  // namespace
 
 Solution Solve(const Graph& graph, const SolveOptions& options, const std::optional<State>& start,
@@ -125,8 +159,8 @@ Solution Solve(const Graph& graph, const SolveOptions& options, const std::optio
   if (start) ValidateStart(graph, *start);
   State state;
   Solution solution;
-  Solver solver(graph, options, monitor);
-  solution.summary = solver.Run(start, &state);
+  solution.summary = SolveInAttempts(graph, options, start, monitor, &state);
+  const Solver solver(graph, options, monitor);
   solution.svd_singular_values = options.start == Start::kSvd
                                      ? solver.SvdSingularValues()
                                      : RowMatrix::Constant(graph.num_objects(), 10, std::nan(""));
