@@ -56,10 +56,10 @@ struct SolveOptions {
   Minimizer minimizer = Minimizer::kDogleg;  ///< of the last stage
   int max_iterations = 300;                  ///< of each batch stage
   double function_tolerance = 1e-10;         ///< stop when |change of cost| / cost falls below
-  int grow_poses = 5;                        ///< poses added at a time
+  int grow_poses = 10;                       ///< poses added at a time
   int grow_iterations = 10;                  ///< Levenberg-Marquardt steps after each addition
   double grow_tolerance = 1e-3;              ///< function tolerance of these steps
-  int grow_min_views = 4;                    ///< boxes an object needs before it is started
+  int grow_min_views = 8;                    ///< boxes an object needs before it is started
 };
 
 }  // namespace dqslam

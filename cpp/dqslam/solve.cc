@@ -126,8 +126,9 @@ class Solver {
   const PreparedGraph prepared_;
 };
 
-// Grows again in other steps where objects are stuck, up to two times, and keeps the lowest cost.
-// With a robust loss an object may well have outliers only: there it grows once.
+// Grows again in smaller steps, up to two times, where objects are stuck or the last stage did not
+// converge, and keeps the lowest cost.  With a robust loss an object may well have outliers only:
+// there it grows once.
 Summary SolveInAttempts(const Graph& graph, const SolveOptions& options,
                         const std::optional<State>& start, const Monitor& monitor, State* state) {
   const bool repeats = !start && options.mode == Mode::kSlam && options.loss == Loss::kNone &&
@@ -136,8 +137,7 @@ Summary SolveInAttempts(const Graph& graph, const SolveOptions& options,
   SolveOptions variant = options;
   Summary best;
   for (int attempt = 0; attempt < (repeats ? 3 : 1); ++attempt) {
-    if (attempt == 1) variant.grow_poses = 2 * options.grow_poses;
-    if (attempt == 2) variant.grow_poses = (options.grow_poses + 1) / 2;
+    variant.grow_poses = std::max(options.grow_poses >> attempt, 1);
     Solver solver(graph, variant, monitor);
     State reached;
     const Summary summary = solver.Run(start, &reached);
@@ -145,7 +145,7 @@ Summary SolveInAttempts(const Graph& graph, const SolveOptions& options,
       best = summary;
       *state = reached;
     }
-    if (!repeats || !solver.LeavesObjectsStuck(*state)) break;
+    if (best.converged && !solver.LeavesObjectsStuck(*state)) break;
   }
   return best;
 }
