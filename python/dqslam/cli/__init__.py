@@ -6,6 +6,7 @@ from typing import Any
 
 import typer
 
+from dqslam.cli.ablation import ablation
 from dqslam.cli.degeneracy import degeneracy
 from dqslam.cli.paper import paper
 from dqslam.cli.run import run
@@ -20,6 +21,7 @@ app = typer.Typer(
 app.command()(paper)
 app.command()(run)
 app.command()(degeneracy)
+app.command()(ablation)
 
 _INTERRUPTED = 130
 _BAD_INPUT = 2
