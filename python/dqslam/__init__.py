@@ -30,3 +30,7 @@ from dqslam.simulate import simulate as simulate
 from dqslam.size_prior import SizePrior as SizePrior
 from dqslam.size_prior import SizePriors as SizePriors
 from dqslam.size_prior import load_size_priors as load_size_priors
+from dqslam.uncertainty import Bound as Bound
+from dqslam.uncertainty import Marginals as Marginals
+from dqslam.uncertainty import marginal_covariances as marginal_covariances
+from dqslam.uncertainty import posterior_bound as posterior_bound

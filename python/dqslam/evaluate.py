@@ -25,33 +25,41 @@ class Report:
     rmse_landmark: float
     """Mean distance of the mapped objects' centres from their true places, metres."""
     rmse_volume: float
-    """Mean absolute error of the mapped objects' volumes, cubic metres."""
+    """Mean absolute error of the mapped objects' volumes, cubic metres; of the paper's volume."""
     mapped: int
     """Objects of the estimate."""
     not_ellipsoids: int
     """Mapped objects whose dual quadric is no ellipsoid."""
+    volume_relative_errors: tuple[float, ...] = ()
+    """|error| / truth of our own volume of each mapped object that is an ellipsoid."""
 
     def __str__(self) -> str:
         """Show one line per error."""
+        relative = np.median(self.volume_relative_errors) if self.volume_relative_errors else np.nan
         return (
             f"position error  {self.rmse_pos:8.3f} m   (odometry {self.odometry_rmse_pos:.3f} m)\n"
             f"object centres  {self.rmse_landmark:8.3f} m   ({self.mapped} objects, "
             f"{self.not_ellipsoids} of them no ellipsoid)\n"
             f"object volumes  {self.rmse_volume:8.3f} m^3"
+            f"   (our own volumes: {relative:.0%} off)"
         )
 
 
 def evaluate(estimate: Estimate, truth: Truth) -> Report:
     """Compare an estimate with the truth, object by object id, without any alignment."""
-    rows = _true_rows(estimate.object_ids, truth)
+    rows = true_rows(estimate.object_ids, truth)
     volume_errors = np.abs(cube_volumes(estimate.shapes) - truth.volume[rows])
+    real = estimate.is_ellipsoid
+    volumes_of = box_volumes if truth.ellipsoids is None else ellipsoid_volumes
+    relative_errors = np.abs(volumes_of(estimate.shapes[real]) / truth.volume[rows][real] - 1.0)
     return Report(
         rmse_pos=position_error(truth.pose_model, estimate.poses, truth.poses),
         odometry_rmse_pos=position_error(truth.pose_model, estimate.initial_poses, truth.poses),
         rmse_landmark=mean_distance(estimate.centers, truth.center[rows]),
         rmse_volume=float(volume_errors.mean()),
         mapped=len(rows),
-        not_ellipsoids=int((~estimate.is_ellipsoid).sum()),
+        not_ellipsoids=int((~real).sum()),
+        volume_relative_errors=tuple(relative_errors.tolist()),
     )
 
 
@@ -79,6 +87,23 @@ def cube_volumes(shapes: Floats) -> Floats:
     """
     smallest = np.linalg.eigvalsh(shapes)[:, 0]
     return np.asarray((2.0 * np.sqrt(np.abs(smallest))) ** 3)
+
+
+def ellipsoid_volumes(shapes: Floats) -> Floats:
+    """Return the volume [m^3] of each ellipsoid, from shapes S [m^2] of shape (o, 3, 3)."""
+    return np.asarray(4.0 / 3.0 * np.pi * np.sqrt(np.linalg.det(shapes)))
+
+
+def box_volumes(shapes: Floats) -> Floats:
+    """Return the volume [m^3] of the upright box-shaped object that each ellipsoid was fitted to.
+
+    From shapes S [m^2] of shape (o, 3, 3), in a world whose z axis is up. An upright box of ground
+    l x w, seen from all around, is (l + w) / pi half as wide in the mean, and so is the ellipsoid
+    that has the same outlines: its horizontal semi-axes are 4 / pi times the half sides (l = w),
+    or the geometric mean of both nearly so. Its height is the box's own, 2 sqrt(S_zz).
+    """
+    across = np.sqrt(np.linalg.det(shapes[:, :2, :2]))  # product of the ground's semi-axes
+    return np.asarray(8.0 * (np.pi / 4.0) ** 2 * across * np.sqrt(shapes[:, 2, 2]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,7 +215,7 @@ def _same_shape(points: Floats, true_points: Floats) -> tuple[Floats, Floats]:
     return points, true_points
 
 
-def _true_rows(object_ids: Ints, truth: Truth) -> Ints:
+def true_rows(object_ids: Ints, truth: Truth) -> Ints:
     """Return the row in the truth of each mapped object."""
     row_of = {int(object_id): row for row, object_id in enumerate(truth.object_id)}
     unknown = [int(object_id) for object_id in object_ids if int(object_id) not in row_of]

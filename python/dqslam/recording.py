@@ -146,6 +146,11 @@ class RelativePositions:
         """Return the number of measurements."""
         return len(self.object_in_robot)
 
+    def select(self, rows: Ints | Bools) -> Self:
+        """Return some of the measurements: their rows, or a flag for each (p,)."""
+        names = ("pose", "object_id", "object_in_robot", "covariance")
+        return replace(self, **{name: getattr(self, name)[rows] for name in names})
+
 
 @dataclass(frozen=True, eq=False)
 class Recording:

@@ -8,8 +8,8 @@ import time
 
 import pytest
 
-from dqslam import experiment
 from dqslam.cli import main
+from dqslam.experiment import methods, trial
 
 RUN = "import sys; from dqslam.cli import main; sys.exit(main())"
 
@@ -44,7 +44,7 @@ def test_table_and_figure(tmp_path, capsys):
 
 
 def test_the_papers_method_shows_its_scan(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(experiment, "ALGEBRAIC_SIGMAS", (1e10, 1e15))
+    monkeypatch.setattr(methods, "ALGEBRAIC_SIGMAS", (1e10, 1e15))
     command = ["paper", "--trials", "1", "--method", "paper", "--objects", "ellipsoids"]
     assert main([*command, "--out", str(tmp_path), "--jobs", "1"]) == 0
     table = json.loads((tmp_path / "table.json").read_text())
@@ -56,11 +56,28 @@ def test_the_papers_method_shows_its_scan(tmp_path, capsys, monkeypatch):
     assert "1e+15" in shown
 
 
+def test_the_bound_and_wrong_ids_add_to_each_row(tmp_path, capsys):
+    command = ["paper", "--trials", "1", "--seed", "6", "--jobs", "1", "--bound"]
+    command += ["--wrong-associations", "0.2", "--wrong-association-kind", "structured"]
+    assert main([*command, "--loss", "cauchy", "--out", str(tmp_path)]) == 0
+    table = json.loads((tmp_path / "table.json").read_text())
+    assert (table["loss"], table["wrong_association_kind"]) == ("cauchy", "structured")
+    for row in (table["monocular"], table["relative_position"]):
+        assert row["failures"] == 0
+        assert 0.3 < row["efficiency"] < 3.0
+        assert row["optimum_rate"] in (0.0, 1.0)
+        assert 0.9 < row["inlier_precision"] <= 1.0
+        assert row["volume_relative_error"]["med"] < 0.5
+    shown = capsys.readouterr().out
+    for label in ("error / bound", "95 % interval", "inliers, recall", "told right ids"):
+        assert label in shown
+
+
 def test_failures_are_shown(tmp_path, capsys, monkeypatch):
     def fail(graph, options):
         raise ValueError("row 3: [bad] input")
 
-    monkeypatch.setattr(experiment, "solve", fail)
+    monkeypatch.setattr(trial, "solve", fail)
     assert main(["paper", "--trials", "1", "--out", str(tmp_path), "--jobs", "1"]) == 0
     shown = capsys.readouterr().out
     assert "failed: monocular, seed 0: ValueError: row 3: [bad] input" in shown
@@ -77,6 +94,10 @@ def test_failures_are_shown(tmp_path, capsys, monkeypatch):
         (["--jobs", "0"], "--jobs"),
         (["--objects", "spheres"], "--objects"),
         (["--method", "magic"], "--method"),
+        (["--wrong-associations", "0.5"], "--wrong-associations"),
+        (["--loss", "l1"], "'l1' is not one of 'none', 'huber', 'cauchy', 'dcs', 'switchable'"),
+        (["--wrong-association-kind", "swap"], "'swap' is not one of 'random', 'structured'"),
+        (["--method", "paper", "--bound"], "method: the paper's has neither"),
         (["--wrong"], "No such option: --wrong"),
     ],
 )

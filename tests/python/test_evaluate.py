@@ -1,13 +1,16 @@
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
 import oracle
 from dqslam import Camera, Estimate, PoseModel, _core, evaluate
 from dqslam.evaluate import (
     absolute_trajectory_error,
     align_rigid,
+    box_volumes,
     center_errors,
     cube_volumes,
+    ellipsoid_volumes,
     position_error,
 )
 from dqslam.recording import Truth
@@ -193,3 +196,51 @@ def test_estimate_reads_centres_and_shapes_from_quadrics():
     np.testing.assert_allclose(found.centers, [[1.0, -2.0, 0.5]])
     shape = rotation @ np.diag([0.25, 0.09, 0.04]) @ rotation.T
     np.testing.assert_allclose(found.shapes[0], shape, atol=1e-12)
+
+
+# --- volumes -------------------------------------------------------------------------------------
+
+
+def turned(angle):
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def test_volume_of_an_ellipsoid_is_that_of_a_turned_one():
+    shape = turned(0.7) @ np.diag([4.0, 1.0, 0.25]) @ turned(0.7).T
+    np.testing.assert_allclose(ellipsoid_volumes(shape[None]), 4.0 / 3.0 * np.pi * 2.0 * 1.0 * 0.5)
+
+
+@pytest.mark.parametrize(
+    ("sides", "tolerance"),
+    [((0.5, 0.5, 0.5), 1e-3), ((0.6, 0.4, 0.9), 0.02), ((1.0, 0.4, 0.3), 0.09)],
+)
+def test_volume_of_a_box_seen_from_all_around(sides, tolerance):
+    """Fit an ellipse to the half widths of a box from all sides; its height is seen from afar."""
+    angle = np.linspace(0.0, np.pi, 400, endpoint=False)
+    normal = np.column_stack([np.cos(angle), np.sin(angle)])
+    half_width = np.abs(normal) @ np.array(sides[:2]) / 2.0
+
+    def misfit(ground):
+        xx, xy, yy = ground
+        squared = xx * normal[:, 0] ** 2 + 2.0 * xy * normal.prod(axis=1) + yy * normal[:, 1] ** 2
+        return np.sqrt(squared) - half_width
+
+    xx, xy, yy = least_squares(misfit, [sides[0] ** 2 / 4.0, 0.0, sides[1] ** 2 / 4.0]).x
+    shape = np.array([[xx, xy, 0.0], [xy, yy, 0.0], [0.0, 0.0, sides[2] ** 2 / 4.0]])
+    shape = turned(0.4) @ shape @ turned(0.4).T
+    np.testing.assert_allclose(box_volumes(shape[None]), np.prod(sides), rtol=tolerance)
+
+
+def test_relative_errors_of_volumes_leave_out_what_is_no_ellipsoid():
+    shape = np.diag([0.04, 0.01, 0.09])
+    found = estimate(
+        TRUE_POSES,
+        [quadric([1, 2, 3], shape), quadric([1, 2, 3], -np.eye(3))],
+        [4, 5],
+        ellipsoids=np.array([np.zeros(9), np.full(9, np.nan)]),
+    )
+    report = evaluate(found, truth(TRUE_POSES, TRUE_CENTERS, [0.02, 1.0, 1.0]))
+    box = 8.0 * (np.pi / 4.0) ** 2 * 0.2 * 0.1 * 0.3
+    assert report.volume_relative_errors == pytest.approx((box / 0.02 - 1.0,))
+    assert f"{box / 0.02 - 1.0:.0%} off" in str(report)

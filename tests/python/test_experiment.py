@@ -4,25 +4,28 @@ import multiprocessing
 import numpy as np
 import pytest
 
-from dqslam import experiment, load_scenario
+from dqslam import load_scenario
 from dqslam.evaluate import Report
 from dqslam.experiment import (
-    ALGEBRAIC_SIGMAS,
     Outcome,
+    Settings,
     Statistics,
     Trial,
     example_maps,
     method_options,
+    methods,
     run_paper,
     tabulate,
 )
+from dqslam.experiment import trial as trial_module
+from dqslam.experiment.scores import BoundScore, RobustScore
 
 PAPER = load_scenario("paper")
 
 
 def report(error):
-    """A report whose three errors are error, 2 error and 3 error."""
-    return Report(error, 5.0, 2.0 * error, 3.0 * error, mapped=1, not_ellipsoids=0)
+    """A report whose errors are error, 2 error and 3 error, and 0.1 and 0.3 of the volumes."""
+    return Report(error, 5.0, 2.0 * error, 3.0 * error, 1, 0, volume_relative_errors=(0.1, 0.3))
 
 
 def trial(seed, *errors):
@@ -42,21 +45,23 @@ def outcome(error):
 
 
 def with_sigmas(monkeypatch, *sigmas):
-    monkeypatch.setattr(experiment, "ALGEBRAIC_SIGMAS", sigmas)
+    monkeypatch.setattr(methods, "ALGEBRAIC_SIGMAS", sigmas)
 
 
 def test_table_by_hand():
-    table = tabulate([trial(0, 1.0), trial(1, 2.0), trial(2, 6.0)], PAPER, "dqslam")
+    table = tabulate([trial(0, 1.0), trial(1, 2.0), trial(2, 6.0)], PAPER, Settings())
     assert table.as_dict() == {
         "trials": 3,
         "seed": 0,
         "objects": "cubes",
         "method": "dqslam",
+        "loss": "none",
         "odometry": {"rmse_pos": {"avg": 11.0, "med": 11.0, "max": 12.0}},
         "monocular": {
             "rmse_pos": {"avg": 3.0, "med": 2.0, "max": 6.0},
             "rmse_landmark": {"avg": 6.0, "med": 4.0, "max": 12.0},
             "rmse_volume": {"avg": 9.0, "med": 6.0, "max": 18.0},
+            "volume_relative_error": {"avg": pytest.approx(0.2), "med": pytest.approx(0.2)},
             "failures": 0,
             "seconds_per_trial": {"med": 1.0},
         },
@@ -64,6 +69,7 @@ def test_table_by_hand():
             "rmse_pos": {"avg": 1.5, "med": 1.0, "max": 3.0},
             "rmse_landmark": {"avg": 3.0, "med": 2.0, "max": 6.0},
             "rmse_volume": {"avg": 4.5, "med": 3.0, "max": 9.0},
+            "volume_relative_error": {"avg": pytest.approx(0.2), "med": pytest.approx(0.2)},
             "failures": 0,
             "seconds_per_trial": {"med": 1.0},
         },
@@ -71,7 +77,7 @@ def test_table_by_hand():
 
 
 def test_failed_trials_are_counted_and_named():
-    table = tabulate([trial(4, 1.0), trial(5, None), trial(6, 3.0)], PAPER, "dqslam")
+    table = tabulate([trial(4, 1.0), trial(5, None), trial(6, 3.0)], PAPER, Settings())
     row = table.best("monocular")
     assert row.failures == {5: "ValueError: no"}
     assert row.metrics["rmse_pos"] == Statistics(avg=2.0, med=2.0, max=3.0)
@@ -81,16 +87,41 @@ def test_failed_trials_are_counted_and_named():
 
 def test_json_has_null_where_no_trial_succeeded(tmp_path):
     path = tmp_path / "deep" / "table.json"
-    tabulate([trial(0, None)], PAPER, "dqslam").save(path)
+    tabulate([trial(0, None)], PAPER, Settings()).save(path)
     table = json.loads(path.read_text())
     assert table["monocular"]["rmse_pos"] == {"avg": None, "med": None, "max": None}
     assert table["monocular"]["failures"] == 1
     assert [file.name for file in path.parent.iterdir()] == ["table.json"]
 
 
+def test_scores_by_hand():
+    """Efficiency is mean error / mean bound; NEES are sums over the degrees of freedom."""
+    bounds = [BoundScore(0.5, 2.0, 3, 6.0, True), BoundScore(1.5, 7.0, 3, 3.0, False)]
+    robust = [RobustScore(1.0, 0.8, 0.3), RobustScore(0.9, 0.6, 0.5)]
+    outcomes = [
+        Outcome(report(error), 1.0, bound=bound, robust=one)
+        for error, bound, one in zip((1.0, 2.0), bounds, robust, strict=True)
+    ]
+    outcomes.append(Outcome(None, 1.0, "ValueError: no"))
+    trials = [
+        Trial(seed, 5.0, {"monocular": (one,), "relative_position": (one,)})
+        for seed, one in enumerate(outcomes)
+    ]
+    row = tabulate(trials, PAPER, Settings(bound=True)).as_dict()["monocular"]
+    assert row["efficiency"] == pytest.approx(1.5 / 1.0)
+    assert row["anees"] == pytest.approx(9.0 / 6.0)
+    assert row["anees_interval"] == pytest.approx([1.2373 / 6.0, 14.4494 / 6.0], abs=1e-4)
+    assert row["anees_objects"] == pytest.approx(1.5)
+    assert row["optimum_rate"] == 0.5
+    assert row["inlier_precision"] == pytest.approx(0.95)
+    assert row["inlier_recall"] == pytest.approx(0.7)
+    assert row["oracle_rmse_pos"] == pytest.approx({"avg": 0.4, "med": 0.4, "max": 0.5})
+    assert row["failures"] == 1
+
+
 def test_the_scan_keeps_every_weight_and_the_best_is_used(monkeypatch):
     with_sigmas(monkeypatch, 1.0, 10.0, 100.0)
-    table = tabulate([trial(0, 4.0, 2.0, 3.0), trial(1, 4.0, 4.0, 5.0)], PAPER, "paper")
+    table = tabulate([trial(0, 4.0, 2.0, 3.0), trial(1, 4.0, 4.0, 5.0)], PAPER, Settings("paper"))
     assert table.best("monocular").algebraic_sigma == 10.0
     written = table.as_dict()
     assert written["monocular"]["rmse_pos"]["avg"] == 3.0
@@ -104,18 +135,20 @@ def test_the_scan_keeps_every_weight_and_the_best_is_used(monkeypatch):
 
 def test_a_weight_cannot_win_by_failing(monkeypatch):
     with_sigmas(monkeypatch, 1.0, 10.0, 100.0)
-    table = tabulate([trial(0, 0.1, 4.0, None), trial(1, None, 5.0, None)], PAPER, "paper")
+    table = tabulate(
+        [trial(0, 0.1, 4.0, None), trial(1, None, 5.0, None)], PAPER, Settings("paper")
+    )
     assert table.best("monocular").algebraic_sigma == 10.0
 
 
 def test_all_weights_may_fail(monkeypatch):
     with_sigmas(monkeypatch, 1.0, 10.0)
-    table = tabulate([trial(0, None, None)], PAPER, "paper")
+    table = tabulate([trial(0, None, None)], PAPER, Settings("paper"))
     assert len(table.best("monocular").failures) == 1
 
 
 def test_the_papers_method_is_as_published():
-    options = method_options("paper", 1e9)
+    options = method_options(Settings("paper"), 1e9)
     names = [options.residual.name, options.landmark_model.name, options.start.name]
     assert names == ["ALGEBRAIC", "DUAL_QUADRIC", "IDENTITY"]
     assert [options.schedule.name, options.loss.name, options.mode.name] == [
@@ -124,7 +157,7 @@ def test_the_papers_method_is_as_published():
         "SLAM",
     ]
     assert options.algebraic_sigma == 1e9
-    np.testing.assert_allclose(np.diff(np.log10(ALGEBRAIC_SIGMAS)), 1.0)
+    np.testing.assert_allclose(np.diff(np.log10(methods.ALGEBRAIC_SIGMAS)), 1.0)
 
 
 # --- real trials ---------------------------------------------------------------------------------
@@ -148,6 +181,31 @@ def test_trials_beat_odometry_and_do_not_depend_on_the_processes():
     assert apart.odometry == here.odometry
 
 
+def test_estimates_of_ellipsoids_are_at_the_optimum_and_know_their_error():
+    ellipsoids = PAPER.model_copy(update={"objects": "ellipsoids"})
+    table = run_paper(ellipsoids, trials=3, seed=6, method="dqslam", bound=True).as_dict()
+    for name in ("monocular", "relative_position"):
+        row = table[name]
+        assert row["optimum_rate"] == 1.0
+        assert 0.4 < row["efficiency"] < 1.8
+        low, high = row["anees_interval"]
+        assert 0.5 * low < row["anees"] < 1.5 * high
+        assert 0.05 < row["anees_objects"] < 3.0
+        assert row["volume_relative_error"]["med"] < 0.05
+
+
+def test_wrong_ids_are_found():
+    wrong = {"wrong_associations": 0.2}
+    scenario = PAPER.model_copy(update={"detector": PAPER.detector.model_copy(update=wrong)})
+    table = run_paper(scenario, trials=1, seed=6, method="dqslam").as_dict()
+    assert (table["wrong_associations"], table["wrong_association_kind"]) == (0.2, "random")
+    assert table["loss"] == methods.ROBUST_LOSS
+    row = table["monocular"]
+    assert row["inlier_precision"] > 0.97
+    assert row["inlier_recall"] > 0.85
+    assert row["rmse_pos"]["avg"] < 1.5 * row["oracle_rmse_pos"]["avg"] + 0.02
+
+
 def test_the_papers_method_depends_on_its_weight(monkeypatch):
     with_sigmas(monkeypatch, 1e10, 1e15)
     table = run_paper(PAPER, trials=1, seed=6, method="paper")
@@ -157,7 +215,7 @@ def test_the_papers_method_depends_on_its_weight(monkeypatch):
 
 
 def test_a_trial_that_raises_does_not_stop_the_others(monkeypatch):
-    real_solve, calls = experiment.solve, []
+    real_solve, calls = trial_module.solve, []
 
     def solve_or_raise(graph, options):
         calls.append(graph)
@@ -165,11 +223,11 @@ def test_a_trial_that_raises_does_not_stop_the_others(monkeypatch):
             raise RuntimeError("the solver\ngave up")
         return real_solve(graph, options)
 
-    monkeypatch.setattr(experiment, "solve", solve_or_raise)
+    monkeypatch.setattr(trial_module, "solve", solve_or_raise)
     table = run_paper(PAPER, trials=1, seed=6, method="dqslam")
     assert table.best("monocular").failures == {6: "RuntimeError: the solver\ngave up"}
     assert table.best("relative_position").failures == {}
-    assert example_maps(PAPER, table, 6) == []  # maps are monocular
+    assert example_maps(table, 6) == []  # maps are monocular
 
 
 def test_an_error_while_processes_run_stops_them():
@@ -187,6 +245,9 @@ def test_an_error_while_processes_run_stops_them():
         ({"trials": 0}, "trials: expected 1 or more, got 0"),
         ({"seed": -1}, "seed: expected 0 or more, got -1"),
         ({"jobs": 0}, "jobs: expected 1 or more, got 0"),
+        ({"loss": "l1"}, "loss: 'l1' is none of none, huber, cauchy, dcs, switchable, gnc_tls"),
+        ({"method": "paper", "bound": True}, "the paper's has neither a robust loss nor a bound"),
+        ({"method": "paper", "loss": "huber"}, "the paper's has neither a robust loss nor"),
     ],
 )
 def test_bad_settings_are_refused(settings, message):

@@ -1,20 +1,19 @@
 """``dqslam paper``: the paper's table and figure."""
 
 import os
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from dqslam.cli.progress import show_progress
+
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
     from dqslam.experiment import PaperTable, RowName, Statistics
-    from dqslam.scenario import Scenario
 
 ROWS: "dict[RowName, str]" = {
     "monocular": "monocular",
@@ -24,6 +23,16 @@ METRICS = {
     "rmse_pos": "positions, m",
     "rmse_landmark": "objects' centres, m",
     "rmse_volume": "objects' volumes, m\u00b3",
+}
+SCORES = {
+    "efficiency": "error / bound",
+    "anees": "NEES of last pose",
+    "anees_interval": "  95 % interval",
+    "anees_objects": "NEES of a centre",
+    "optimum_rate": "share at optimum",
+    "inlier_precision": "inliers, precision",
+    "inlier_recall": "inliers, recall",
+    "oracle_rmse_pos": "told right ids, m",
 }
 EXAMPLES = 6  # maps drawn, as in the paper's figure
 
@@ -40,6 +49,25 @@ def paper(
         Literal["dqslam", "paper"],
         typer.Option(help="dqslam: our best estimator; paper: as published."),
     ] = "dqslam",
+    bound: Annotated[
+        bool,
+        typer.Option(
+            "--bound",
+            help="Compare with the posterior bound and the optimum. Boxes of ellipsoids are then "
+            "weighed by the scenario's own noise.",
+        ),
+    ] = False,
+    wrong_associations: Annotated[
+        float, typer.Option(min=0.0, max=0.4, help="Share of boxes with a wrong object id.")
+    ] = 0.0,
+    wrong_association_kind: Annotated[
+        Literal["random", "structured"],
+        typer.Option(help="Whose id: any other object's, or the nearest one's."),
+    ] = "random",
+    loss: Annotated[
+        Literal["none", "huber", "cauchy", "dcs", "switchable", "gnc_tls", "gnc_gm"] | None,
+        typer.Option(help="Robust loss on boxes. Default: none, or gnc_tls with wrong ids."),
+    ] = None,
     jobs: Annotated[int | None, typer.Option(min=1, help="Processes; default: all cores.")] = None,
 ) -> None:
     """Run the paper's experiment, and print its table beside the paper's own.
@@ -51,14 +79,22 @@ def paper(
     from dqslam.experiment import run_paper
     from dqslam.scenario import load_scenario
 
-    scenario = load_scenario("paper").model_copy(update={"objects": objects})
+    scenario = load_scenario("paper")
+    wrong = {
+        "wrong_associations": wrong_associations,
+        "wrong_association_kind": wrong_association_kind,
+    }
+    detector = scenario.detector.model_copy(update=wrong)
+    scenario = scenario.model_copy(update={"objects": objects, "detector": detector})
     out.mkdir(parents=True, exist_ok=True)
-    with _progress(trials) as progress:
+    with show_progress(trials) as progress:
         table = run_paper(
             scenario,
             trials=trials,
             seed=seed,
             method=method,
+            loss=loss,
+            bound=bound,
             jobs=jobs or os.cpu_count() or 1,
             progress=progress,
         )
@@ -71,20 +107,7 @@ def paper(
         for failed, why in table.best(row).failures.items():
             console.print(f"failed: {title}, seed {failed}: {why}", markup=False)
     console.print(f"wrote {out / 'table.json'}", markup=False)
-    _draw(scenario, table, out / "maps.png", console)
-
-
-@contextmanager
-def _progress(trials: int) -> Iterator[Callable[[int, int], None]]:
-    """Show a bar with the time left on stderr while trials run."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
-
-    columns = ("trials", BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), "left")
-    console = Console(stderr=True)
-    with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
-        task = bar.add_task("trials", total=trials)
-        yield lambda done, _: bar.update(task, completed=done)
+    _draw(table, out / "maps.png", console)
 
 
 def _results(table: "PaperTable") -> "Table":
@@ -95,7 +118,7 @@ def _results(table: "PaperTable") -> "Table":
     from dqslam.experiment import PAPER_ODOMETRY, PAPER_ROWS
 
     shown = Table(
-        title=f"seeds {table.seeds[0]} to {table.seeds[-1]}, {table.objects}, "
+        title=f"seeds {table.seeds[0]} to {table.seeds[-1]}, {table.scenario.objects}, "
         f"method {table.method}",
         box=SIMPLE_HEAD,
     )
@@ -110,6 +133,11 @@ def _results(table: "PaperTable") -> "Table":
         shown.add_row(title, style="bold")
         for metric, label in METRICS.items():
             shown.add_row(f"  {label}", *_cells(printed[metric]), *_cells(row.metrics[metric]))
+        volume = row.volume_relative_error
+        shown.add_row("  our volumes, rel.", "", "", *_cells((volume.avg, volume.med)))
+        for key, label in SCORES.items():
+            if key in row.scores:
+                shown.add_row(f"  {label}", "", "", *_score_cells(row.scores[key]))
         shown.add_row("  trials failed", "", "", str(len(row.failures)))
         shown.add_row("  seconds a trial", "", "", "", f"{row.seconds_med:.2f}")
     return shown
@@ -146,7 +174,13 @@ def _cells(values: "Statistics | tuple[float, float]") -> list[str]:
     return [f"{number:.2f}" if not number >= 1e4 else f"{number:.0e}" for number in numbers]
 
 
-def _draw(scenario: "Scenario", table: "PaperTable", path: Path, console: "Console") -> None:
+def _score_cells(score: "float | list[float] | dict[str, float]") -> list[str]:
+    values = score if isinstance(score, list) else [score]
+    numbers = list(score.values()) if isinstance(score, dict) else values
+    return [f"{number:.2f}" for number in numbers]
+
+
+def _draw(table: "PaperTable", path: Path, console: "Console") -> None:
     from dqslam.experiment import example_maps
 
     if find_spec("matplotlib") is None:
@@ -154,7 +188,7 @@ def _draw(scenario: "Scenario", table: "PaperTable", path: Path, console: "Conso
         return
     from dqslam.plot import plot_maps
 
-    maps = example_maps(scenario, table, EXAMPLES)
+    maps = example_maps(table, EXAMPLES)
     if not maps:
         console.print("no maps.png: no monocular trial succeeded")
         return

@@ -1,0 +1,83 @@
+"""Run the paper's experiment."""
+
+from collections.abc import Callable
+from functools import partial
+
+from dqslam.estimate import Estimate
+from dqslam.evaluate import evaluate
+from dqslam.experiment.methods import (
+    LossName,
+    Method,
+    Settings,
+    box_noise,
+    default_loss,
+    method_options,
+    seen_by,
+)
+from dqslam.experiment.table import PaperTable, tabulate
+from dqslam.experiment.trial import Trial, run_trial
+from dqslam.pool import run_each
+from dqslam.problem import build_graph, solve
+from dqslam.recording import Truth
+from dqslam.scenario import Scenario
+from dqslam.simulate import simulate
+
+Progress = Callable[[int, int], None]
+
+
+def run_paper(
+    scenario: Scenario,
+    *,
+    trials: int,
+    seed: int,
+    method: Method,
+    loss: LossName | None = None,
+    bound: bool = False,
+    jobs: int = 1,
+    progress: Progress | None = None,
+) -> PaperTable:
+    """Run trials with seeds seed, seed + 1, ... and tabulate their errors.
+
+    Parameters
+    ----------
+    loss
+        The robust loss on boxes; by default none, or one that suits where some ids are wrong.
+    bound
+        Whether to compare with the posterior bound and the optimum, which takes some more solves.
+        The estimator is then told the true noise of the boxes, where they have one (ellipsoids).
+    jobs
+        Processes; with 1 everything runs in this one. The numbers do not depend on it, times do.
+    progress
+        Called with (trials done, trials) after each.
+    """
+    for name, value, least in (("trials", trials, 1), ("seed", seed, 0), ("jobs", jobs, 1)):
+        if value < least:
+            raise ValueError(f"{name}: expected {least} or more, got {value}")
+    settings = Settings(method, loss or default_loss(scenario, method), bound)
+    run = partial(_run_seed, scenario=scenario, settings=settings)
+    done: list[Trial] = []
+    for trial in run_each(run, range(seed, seed + trials), jobs=jobs):
+        done.append(trial)
+        if progress is not None:
+            progress(len(done), trials)
+    return tabulate(sorted(done, key=lambda trial: trial.seed), scenario, settings)
+
+
+def _run_seed(seed: int, scenario: Scenario, settings: Settings) -> Trial:
+    return run_trial(scenario, seed, settings)
+
+
+def example_maps(table: PaperTable, count: int) -> list[tuple[str, Estimate, Truth]]:
+    """Solve the first monocular trials that succeeded again: title, estimate, truth of each."""
+    row = table.best("monocular")
+    options = method_options(table.settings, row.algebraic_sigma)
+    noise = box_noise(table.scenario, table.settings)
+    maps = []
+    for seed in [seed for seed in table.seeds if seed not in row.failures][:count]:
+        recording, truth = simulate(table.scenario, seed=seed)
+        graph = build_graph(seen_by("monocular", recording), box_noise=noise)
+        estimate, _ = solve(graph, options)
+        report = evaluate(estimate, truth)
+        errors = f"odometry {report.odometry_rmse_pos:.2f} m, estimate {report.rmse_pos:.2f} m"
+        maps.append((f"seed {seed}: {errors}", estimate, truth))
+    return maps

@@ -1,0 +1,99 @@
+"""One trial: simulate a seed, estimate, and score."""
+
+import time
+from dataclasses import dataclass
+
+from dqslam import _core
+from dqslam._core import SolveOptions
+from dqslam.evaluate import Report, evaluate, position_error
+from dqslam.experiment.methods import (
+    ROWS,
+    RowName,
+    Settings,
+    box_noise,
+    candidate_sigmas,
+    method_options,
+    seen_by,
+)
+from dqslam.experiment.scores import (
+    BoundScore,
+    RobustScore,
+    right_graph_of,
+    score_bound,
+    score_robust,
+)
+from dqslam.problem import BoxNoise, build_graph, solve
+from dqslam.recording import Recording, Truth
+from dqslam.scenario import Scenario
+from dqslam.simulate import simulate
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One solve of one trial: a report, or why there is none."""
+
+    report: Report | None
+    seconds: float
+    """Wall clock of building and solving the problem."""
+    failure: str = ""
+    bound: BoundScore | None = None
+    robust: RobustScore | None = None
+    """Where some ids are wrong."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One seed: the error of odometry, and one outcome per row and candidate sigma."""
+
+    seed: int
+    odometry_rmse_pos: float
+    """Metres."""
+    outcomes: dict[RowName, tuple[Outcome, ...]]
+
+
+def run_trial(scenario: Scenario, seed: int, settings: Settings) -> Trial:
+    """Simulate one seed and solve each row with each sigma; a solve may fail, and is kept."""
+    recording, truth = simulate(scenario, seed=seed)
+    odometry = recording.odometry
+    poses = _core.dead_reckon(odometry.pose_model, odometry.first_pose, odometry.relative)
+    noise = box_noise(scenario, settings)
+    return Trial(
+        seed=seed,
+        odometry_rmse_pos=position_error(truth.pose_model, poses, truth.poses),
+        outcomes={
+            row: tuple(
+                _outcome(seen_by(row, recording), truth, noise, settings, sigma)
+                for sigma in candidate_sigmas(settings.method)
+            )
+            for row in ROWS
+        },
+    )
+
+
+def _outcome(
+    recording: Recording, truth: Truth, noise: BoxNoise, settings: Settings, sigma: float | None
+) -> Outcome:
+    start = time.perf_counter()
+    seconds = None
+    try:
+        options = method_options(settings, sigma)
+        graph = build_graph(recording, box_noise=noise)
+        solved = solve(graph, options)
+        seconds = time.perf_counter() - start
+        report = evaluate(solved[0], truth)
+        right = recording.detections.object_id == truth.box_object_id
+        right_graph = graph if right.all() else right_graph_of(recording, right, noise)
+        bound = robust = None
+        if settings.bound:
+            bound = score_bound(graph, right_graph, truth, solved, options)
+        if not right.all():
+            told = _without_loss(settings, sigma)
+            robust = score_robust(right_graph, right, truth, solved[0], told)
+        return Outcome(report, seconds, bound=bound, robust=robust)
+    except Exception as error:  # whatever it was: counted, shown and never dropped
+        seconds = time.perf_counter() - start if seconds is None else seconds
+        return Outcome(None, seconds, f"{type(error).__name__}: {error}")
+
+
+def _without_loss(settings: Settings, sigma: float | None) -> SolveOptions:
+    return method_options(Settings(settings.method), sigma)

@@ -1,0 +1,163 @@
+"""How uncertain an estimate is, and how good one could be: covariances and their bound.
+
+Gauge: the first pose is fixed; everything is relative to it.
+"""
+
+import re
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from dqslam import _core
+from dqslam._checks import Bools, Floats
+from dqslam._core import LandmarkModel, Mode, SolveOptions
+from dqslam.estimate import Estimate
+from dqslam.evaluate import true_rows
+from dqslam.problem import Graph
+from dqslam.recording import Truth
+
+_TABLES = (
+    "initial_poses",
+    "odometry_from",
+    "odometry_to",
+    "odometry",
+    "odometry_covariance",
+    "box_pose",
+    "box_object",
+    "boxes",
+    "box_covariance",
+    "box_truncated",
+    "position_pose",
+    "position_object",
+    "positions",
+    "position_covariance",
+    "log_size_mean",
+    "log_size_sigma",
+    "scene_priors",
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Marginals:
+    """Marginal covariances of each pose and object; NaN where one is under-constrained."""
+
+    poses: Floats
+    """In the frame of each pose, translation [m] first, then rotation [rad]; (n, k, k)."""
+    objects: Floats
+    """Of centre [m] and log-Cholesky shape, shape (o, 9, 9)."""
+    under_constrained: tuple[str, ...]
+    """A sentence for each pose (row) or object (id) that nothing determines, and why."""
+
+    @property
+    def centers(self) -> Floats:
+        """Covariances of the objects' centres in the world, m^2, shape (o, 3, 3)."""
+        return self.objects[:, :3, :3]
+
+
+@dataclass(frozen=True, eq=False)
+class Bound:
+    """The posterior Cramer-Rao bound: what no unbiased estimator can beat on average."""
+
+    covariance: Marginals
+    """At the truth."""
+    position_error: float
+    """Expected mean distance of the poses from their true places (RMSE_pos), metres."""
+
+
+def marginal_covariances(
+    graph: Graph, estimate: Estimate, options: SolveOptions | None = None
+) -> Marginals:
+    """Return the covariances of an estimate's poses and mapped objects.
+
+    The options are those of the solve; with a robust loss, boxes that do not fit take no part.
+    """
+    options = SolveOptions() if options is None else options
+    is_quadric = options.landmark_model == LandmarkModel.DUAL_QUADRIC
+    landmarks = estimate.dual_quadrics if is_quadric else estimate.ellipsoids
+    mapped = np.isin(graph.object_ids, estimate.object_ids)
+    core = graph.core if mapped.all() else _only_objects(graph.core, mapped)
+    return _marginals(core, estimate.object_ids, options, _core.State(estimate.poses, landmarks))
+
+
+def posterior_bound(graph: Graph, truth: Truth) -> Bound:
+    """Return the bound for a problem, from its covariances at the truth.
+
+    Objects that are no ellipsoids have no true parameters: what mapping finds at the true poses
+    stands in. Ids are taken for right.
+    """
+    options = SolveOptions()
+    state = true_state(graph, truth, options)
+    covariance = _marginals(graph.core, graph.object_ids, options, state)
+    axes = 2 if graph.core.pose_model == _core.PoseModel.SE2 else 3
+    error = expected_distance(covariance.poses[:, :axes, :axes]).mean()
+    return Bound(covariance, float(error))
+
+
+def true_state(graph: Graph, truth: Truth, options: SolveOptions) -> _core.State:
+    """Return the true poses and objects of a problem, the latter mapped if they are no ellipsoids.
+
+    For the ellipsoid model.
+    """
+    if truth.ellipsoids is not None:
+        return _core.State(truth.poses, truth.ellipsoids[true_rows(graph.object_ids, truth)])
+    at_truth = _rebuilt(graph.core, initial_poses=truth.poses)
+    mapping = SolveOptions(mode=Mode.MAPPING, loss=options.loss)
+    return _core.State(truth.poses, _core.solve(at_truth, mapping).landmarks)
+
+
+def expected_distance(covariances: Floats) -> Floats:
+    """Return the mean length of zero-mean Gaussian vectors of covariance (n, k, k), k up to 3.
+
+    With eigenvalues l it is 2 sqrt(2 / pi) R_G(l1, l2, l3): the mean over directions of the
+    spread, Carlson's R_G, times the mean of chi with three degrees of freedom.
+    """
+    from scipy.special import elliprg
+
+    size = covariances.shape[-1]
+    variances = np.zeros((len(covariances), 3))
+    known = np.isfinite(covariances).all(axis=(1, 2))
+    variances[known, :size] = np.linalg.eigvalsh(covariances[known]).clip(min=0.0)
+    variances[~known] = np.nan
+    return np.asarray(2.0 * np.sqrt(2.0 / np.pi) * elliprg(*variances.T))
+
+
+def _marginals(
+    core: _core.Graph, object_ids: Any, options: SolveOptions, state: _core.State
+) -> Marginals:
+    found = _core.covariance(core, options, state)
+    size = round(found.poses.shape[1] ** 0.5)
+    return Marginals(
+        poses=found.poses.reshape(-1, size, size),
+        objects=found.objects.reshape(-1, 9, 9),
+        under_constrained=tuple(
+            re.sub(r"^object (\d+)", lambda row: f"object {object_ids[int(row[1])]}", sentence)
+            for sentence in found.under_constrained
+        ),
+    )
+
+
+def _rebuilt(core: _core.Graph, **changes: Any) -> _core.Graph:
+    """Return a problem with some of its tables replaced."""
+    tables = {name: getattr(core, name) for name in _TABLES} | changes
+    return _core.Graph(core.pose_model, core.camera, **tables)
+
+
+def _only_objects(core: _core.Graph, kept: Bools) -> _core.Graph:
+    """Return a problem without the other objects, kept (o,), and what was measured of them."""
+    row = np.cumsum(kept) - 1
+    box, position = kept[core.box_object], kept[core.position_object]
+    return _rebuilt(
+        core,
+        box_pose=core.box_pose[box],
+        box_object=row[core.box_object[box]],
+        boxes=core.boxes[box],
+        box_covariance=core.box_covariance[box],
+        box_truncated=core.box_truncated[box],
+        position_pose=core.position_pose[position],
+        position_object=row[core.position_object[position]],
+        positions=core.positions[position],
+        position_covariance=core.position_covariance[position],
+        log_size_mean=core.log_size_mean[kept],
+        log_size_sigma=core.log_size_sigma[kept],
+    )
