@@ -22,6 +22,7 @@ from dqslam.problem import BoxNoise, Graph, build_graph
 from dqslam.recording import Recording, Truth
 from dqslam.scenario import Scenario
 from dqslam.simulate import simulate
+from dqslam.uncertainty import posterior_bound, true_state
 
 # Half a chi-square above the cost of a start at the truth: another minimum, or none.
 COST_TOLERANCE = 0.05
@@ -71,8 +72,8 @@ class Outcome:
     """One solve of one trial; no error where it failed."""
 
     reached: bool
-    """Whether it ended at the cost that a start at the truth reaches. Where its residual is not
-    the box, and its own minimum elsewhere: whether a polish with the box residual gets there."""
+    """Whether it ended at the cost that a start at the truth reaches. Where it minimises another
+    cost, of another residual or with wrong ids: whether a polish that is told gets there."""
     error_m: float
     """Mean distance of the poses from the truth; NaN where the solve failed."""
     bound_m: float
@@ -99,37 +100,33 @@ class _Problem:
     """The same without boxes of wrong ids."""
     truth: Truth
     bound_m: float
-    best_costs: dict[tuple[Loss, bool], float] = field(default_factory=dict)
-    """Of a start at the truth, by loss and whether told."""
+    best_cost: float
+    """Of the default estimator that is told, and starts at the truth."""
 
     def graph_of(self, variant: Variant) -> Graph:
         """Return what a variant is given."""
         return self.told if variant.told else self.graph
 
-    def best_cost(self, variant: Variant) -> float:
-        """Return the cost of the default estimator that starts at the truth."""
-        key = variant.loss, variant.told
-        if key not in self.best_costs:
-            graph = self.graph_of(variant)
-            start = _true_state(graph, self.truth)
-            best = _core.solve(graph.core, SolveOptions(loss=variant.loss), start)
-            self.best_costs[key] = best.summary.final_cost
-        return self.best_costs[key]
-
     def is_optimum(self, variant: Variant, solution: _core.Solution) -> bool:
-        """Say whether a solution has that cost, or a residual of its own and its optimum nearby."""
+        """Say whether a solution has the best cost, or leads to it where its own cost is another.
+
+        A solve that minimises the very same cost is judged as it is; any other is polished first.
+        """
         cost = solution.summary.final_cost
-        if variant.residual not in (Residual.BOX, Residual.TANGENT_THEN_BOX):
-            local = SolveOptions(residual=Residual.BOX, schedule=Schedule.BATCH, loss=variant.loss)
+        same = variant.residual in (Residual.BOX, Residual.TANGENT_THEN_BOX) and (
+            variant.told or variant.wrong_ids is None
+        )
+        if not same:
+            rows = np.searchsorted(self.graph_of(variant).object_ids, self.told.object_ids)
+            local = SolveOptions(residual=Residual.BOX, schedule=Schedule.BATCH)
             try:
-                ellipsoids = [_core.ellipsoid_from_dual_quadric(q) for q in solution.dual_quadrics]
-                polished = _core.solve(
-                    self.graph_of(variant).core, local, State(solution.poses, ellipsoids)
-                )
+                quadrics = solution.dual_quadrics[rows]
+                ellipsoids = [_core.ellipsoid_from_dual_quadric(q) for q in quadrics]
+                polished = _core.solve(self.told.core, local, State(solution.poses, ellipsoids))
             except (RuntimeError, ValueError):
                 return False
             cost = polished.summary.final_cost
-        return cost < self.best_cost(variant) + COST_TOLERANCE
+        return cost < self.best_cost + COST_TOLERANCE
 
 
 @dataclass(frozen=True)
@@ -262,36 +259,19 @@ def _problem(
         recording, _ = simulate(scenario.model_copy(update={"detector": detector}), seed=seed)
         right = recording.detections.object_id == clean.detections.object_id
     told = _graph(replace(recording, detections=recording.detections.select(right)))
+    options = SolveOptions()
+    best = _core.solve(told.core, options, true_state(told, truth, options))
     return _Problem(
         graph=_graph(recording),
         told=told,
         truth=truth,
-        bound_m=_expected_error(told, truth),
+        bound_m=posterior_bound(told, truth).position_error,
+        best_cost=best.summary.final_cost,
     )
 
 
 def _graph(recording: Recording) -> Graph:
     return build_graph(replace(recording, positions=None), box_noise=BoxNoise(1.0, 0.0))
-
-
-def _true_state(graph: Graph, truth: Truth) -> State:
-    assert truth.ellipsoids is not None
-    return State(truth.poses, truth.ellipsoids[graph.object_ids])
-
-
-def _expected_error(graph: Graph, truth: Truth) -> float:
-    """Return the mean distance [m] of poses that err by the covariance at the truth.
-
-    That of one pose is sqrt(2 l1 / pi) E(1 - l2 / l1), with l1 >= l2 the eigenvalues of the
-    covariance of its position and E the complete elliptic integral of the second kind.
-    """
-    from scipy.special import ellipe
-
-    covariance = _core.covariance(graph.core, SolveOptions(), _true_state(graph, truth))
-    of_position = np.asarray(covariance.poses).reshape(-1, 3, 3)[1:, :2, :2]  # the first is fixed
-    small, large = np.linalg.eigvalsh(of_position).T
-    expected = np.sqrt(2.0 * large / np.pi) * ellipe(1.0 - small / large)
-    return float(expected.sum() / len(truth.poses))
 
 
 def _outcome(problem: _Problem, variant: Variant) -> Outcome:

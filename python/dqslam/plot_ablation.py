@@ -46,8 +46,10 @@ def plot_ablation(table: AblationTable, path: str | Path) -> None:
 
 def label(name: str) -> str:
     """Return a member of an option's enum in words."""
-    words = name.lower().replace("_", " ")
-    return {"svd": "SVD", "dcs": "DCS"}.get(words, words.replace("gnc", "GNC").replace("then", "→"))
+    words = name.lower().replace("_", " ").replace("then", "→")
+    for lower in ("svd", "dcs", "gnc tls", "gnc gm"):
+        words = words.replace(lower, lower.upper())
+    return words.replace("huber", "Huber").replace("cauchy", "Cauchy")
 
 
 def _draw_map(

@@ -58,11 +58,12 @@ def _results(table: "AblationTable") -> "Table":
     from rich.table import Table
 
     shown = Table(
-        title=f"seeds {table.seed} to {table.seed + table.trials - 1}, ellipsoids, monocular",
+        title=f"seeds {table.seed} to {table.seed + table.trials - 1}, ellipsoids, monocular; "
+        "errors over the posterior bound",
         box=SIMPLE_HEAD,
     )
     shown.add_column("variant", no_wrap=True)
-    for heading in ("optimum", "error/bound", "median", "iterations", "seconds", "failed"):
+    for heading in ("optimum", "mean", "median", "iterations", "seconds", "failed"):
         shown.add_column(heading, justify="right", no_wrap=True)
     block = ""
     for row in table.rows:
