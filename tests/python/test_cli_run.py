@@ -74,6 +74,21 @@ def test_the_map_has_the_objects(files, orbit):
         np.testing.assert_allclose(quadric[:3, 3], entry["center"])
 
 
+def test_sizes_of_classes_are_read_and_checked(files, tmp_path, capsys):
+    sizes = tmp_path / "sizes.toml"
+    sizes.write_text("[classes.cup]\nmedian_m = 0.05\nspread = 1.5\n")
+    assert call(files, "--size-priors", str(sizes), "--mode", "mapping") == 0
+    cup = report(files)["size_prior"]["classes"]["cup"]
+    assert cup == pytest.approx({"median_m": 0.05, "log_sigma": np.log(1.5)})
+    sizes.write_text("[classes.sofa]\nmedian_m = 1\nspread = 1.5\n")
+    capsys.readouterr()
+    assert call(files, "--size-priors", str(sizes)) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "no class 'sofa' in the recording, only: " in line
+    assert call(files, "--size-priors", str(tmp_path / "none.toml")) == 2
+    assert "none.toml" in capsys.readouterr().err
+
+
 def test_report_names_the_settings_and_what_was_dropped(files):
     assert call(files, *PERTURB, "--seed", "7", "--odometry-noise", "translation=1,rotation=2") == 0
     content = report(files)

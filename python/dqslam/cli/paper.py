@@ -66,7 +66,7 @@ def paper(
     ] = "random",
     loss: Annotated[
         Literal["none", "huber", "cauchy", "dcs", "switchable", "gnc_tls", "gnc_gm"] | None,
-        typer.Option(help="Robust loss on boxes. Default: none, or gnc_tls with wrong ids."),
+        typer.Option(help="Robust loss on boxes. Default: none, or gnc_gm with wrong ids."),
     ] = None,
     jobs: Annotated[int | None, typer.Option(min=1, help="Processes; default: all cores.")] = None,
 ) -> None:

@@ -42,6 +42,12 @@ def run(
     groundtruth: Annotated[
         Path | None, typer.Option(help="TUM trajectory to compare with, in any world frame.")
     ] = None,
+    size_priors: Annotated[
+        Path | None,
+        typer.Option(
+            help="TOML table of sizes by class. Default: one size for all, from the recording."
+        ),
+    ] = None,
     max_time_difference: Annotated[
         float | None,
         typer.Option(help="Seconds from a box to its pose. Default: half the interval of poses."),
@@ -52,7 +58,9 @@ def run(
     Writes trajectory.txt, odometry.txt (what it started from), map.json and report.json.
     """
     from dqslam import _core, io, run_recording
+    from dqslam.size_prior import load_size_priors
 
+    sizes = None if size_priors is None else load_size_priors(size_priors)
     added = parse_noise("--perturb-odometry", perturb_odometry)
     believed = parse_noise("--odometry-noise", odometry_noise) or added or io.OdometryNoise()
     reference, reference_name = None, None
@@ -72,7 +80,9 @@ def run(
     if added is not None:
         recording = run_recording.perturb_odometry(recording, added, seed=seed, believed=believed)
     out.mkdir(parents=True, exist_ok=True)
-    result = run_recording.run(recording, mode=_core.Mode[mode.upper()], reference=reference)
+    result = run_recording.run(
+        recording, mode=_core.Mode[mode.upper()], reference=reference, size_prior=sizes
+    )
     report = {
         "camera": str(camera),
         "odometry": str(odometry),

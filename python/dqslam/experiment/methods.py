@@ -17,7 +17,7 @@ LOSSES: tuple[LossName, ...] = get_args(LossName)
 ROWS: tuple[RowName, ...] = ("monocular", "relative_position")
 
 # The least mean RMSE_pos over seeds 0 to 19 with 20 % wrong ids, random and structured.
-ROBUST_LOSS: LossName = "gnc_tls"
+ROBUST_LOSS: LossName = "gnc_gm"
 
 # The paper does not state the weight Lambda of its box residual. Every decade of its sigma, in
 # px^4 m^2, is tried from where boxes overrule odometry (worse than it) to where they do not count.
