@@ -11,13 +11,20 @@ namespace dqslam {
 
 void BindCovariance(py::module_& m) {
   py::class_<Covariance>(m, "Covariance", "Marginal covariances; the first pose is the gauge.")
-      .def_readonly("poses", &Covariance::poses,
+      .def_readonly("poses",
+                    &Covariance::poses,
                     "In the frames of the poses, shape (n, k * k); NaN where under-constrained.")
-      .def_readonly("objects", &Covariance::objects,
+      .def_readonly("objects",
+                    &Covariance::objects,
                     "Of the landmark parameters, shape (o, 81); NaN where under-constrained.")
-      .def_readonly("under_constrained", &Covariance::under_constrained,
+      .def_readonly("under_constrained",
+                    &Covariance::under_constrained,
                     "One sentence for each pose or object that nothing determines.");
-  m.def("covariance", &ComputeCovariance, "graph"_a, "options"_a, "state"_a,
+  m.def("covariance",
+        &ComputeCovariance,
+        "graph"_a,
+        "options"_a,
+        "state"_a,
         py::call_guard<py::gil_scoped_release>(),
         "Marginal covariances at a state; at the true state, the posterior Cramer-Rao bound.");
 }

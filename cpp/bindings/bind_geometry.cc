@@ -12,7 +12,12 @@ using namespace pybind11::literals;
 namespace dqslam {
 namespace {
 
-Camera MakeCamera(double fx, double fy, double cx, double cy, int width, int height,
+Camera MakeCamera(double fx,
+                  double fy,
+                  double cx,
+                  double cy,
+                  int width,
+                  int height,
                   const Eigen::Matrix<double, 5, 1>& distortion,
                   const Eigen::Matrix<double, 7, 1>& robot_from_camera) {
   Camera camera{fx, fy, cx, cy, width, height, distortion, robot_from_camera};
@@ -22,8 +27,15 @@ Camera MakeCamera(double fx, double fy, double cx, double cy, int width, int hei
 
 void BindCamera(py::module_& m) {
   py::class_<Camera>(m, "Camera", "Pinhole camera, rigidly mounted on the robot. Immutable.")
-      .def(py::init(&MakeCamera), "fx"_a, "fy"_a, "cx"_a, "cy"_a, "width"_a, "height"_a,
-           py::kw_only(), "distortion"_a = Camera().distortion,
+      .def(py::init(&MakeCamera),
+           "fx"_a,
+           "fy"_a,
+           "cx"_a,
+           "cy"_a,
+           "width"_a,
+           "height"_a,
+           py::kw_only(),
+           "distortion"_a = Camera().distortion,
            "robot_from_camera"_a = Camera().robot_from_camera,
            "Focal lengths, principal point and size in pixels; k1 k2 p1 p2 k3; the SE(3) mount.")
       .def_readonly("fx", &Camera::fx, "Focal length, pixels.")
@@ -35,31 +47,65 @@ void BindCamera(py::module_& m) {
       .def_readonly("distortion", &Camera::distortion, "k1 k2 p1 p2 k3, shape (5,).")
       .def_readonly("robot_from_camera", &Camera::robot_from_camera, "SE(3) pose, shape (7,).")
       .def_property_readonly("has_distortion", &Camera::HasDistortion)
-      .def("undistort_points", &Camera::UndistortPoints, "distorted"_a,
+      .def("undistort_points",
+           &Camera::UndistortPoints,
+           "distorted"_a,
            "Ideal pinhole pixels of distorted pixels, shape (n, 2).")
-      .def("distort_points", &Camera::DistortPoints, "undistorted"_a,
+      .def("distort_points",
+           &Camera::DistortPoints,
+           "undistorted"_a,
            "Distorted pixels of ideal pinhole pixels, shape (n, 2).")
-      .def("undistort_boxes", &Camera::UndistortBoxes, "distorted"_a,
+      .def("undistort_boxes",
+           &Camera::UndistortBoxes,
+           "distorted"_a,
            "Boxes, shape (n, 4), each edge undistorted at its middle.");
 }
 
 void BindPoses(py::module_& m) {
-  m.def("compose", &ComposeRows, "model"_a, "a_from_b"_a, "b_from_c"_a,
+  m.def("compose",
+        &ComposeRows,
+        "model"_a,
+        "a_from_b"_a,
+        "b_from_c"_a,
         "Compose poses row by row: a_from_c, shape (n, d).");
-  m.def("between", &BetweenRows, "model"_a, "a_from_b"_a, "a_from_c"_a,
+  m.def("between",
+        &BetweenRows,
+        "model"_a,
+        "a_from_b"_a,
+        "a_from_c"_a,
         "Relative poses row by row: b_from_c, shape (n, d).");
-  m.def("plus", &PlusRows, "model"_a, "poses"_a, "tangents"_a,
+  m.def("plus",
+        &PlusRows,
+        "model"_a,
+        "poses"_a,
+        "tangents"_a,
         "Move poses (n, d) by tangents (n, k), in the frames of the poses.");
-  m.def("minus", &MinusRows, "model"_a, "poses"_a, "origins"_a,
+  m.def("minus",
+        &MinusRows,
+        "model"_a,
+        "poses"_a,
+        "origins"_a,
         "Tangents (n, k) that move the origins to the poses.");
-  m.def("dead_reckon", &DeadReckonRows, "model"_a, "first"_a, "relative"_a,
+  m.def("dead_reckon",
+        &DeadReckonRows,
+        "model"_a,
+        "first"_a,
+        "relative"_a,
         "Chain relative poses (n, d) behind the first (d,): shape (n + 1, d).");
-  m.def("world_from_camera", &WorldFromCameraRows, "model"_a, "camera"_a, "poses"_a,
+  m.def("world_from_camera",
+        &WorldFromCameraRows,
+        "model"_a,
+        "camera"_a,
+        "poses"_a,
         "SE(3) poses of the camera, shape (n, 7).");
 }
 
 void BindEllipsoid(py::module_& m) {
-  m.def("ellipsoid_from_axes", &EllipsoidFromAxes, "center"_a, "semi_axes"_a, "orientation_xyzw"_a,
+  m.def("ellipsoid_from_axes",
+        &EllipsoidFromAxes,
+        "center"_a,
+        "semi_axes"_a,
+        "orientation_xyzw"_a,
         "Log-Cholesky parameters (9,) of a centre, semi-axes [m] and world_from_object rotation.");
   m.def(
       "axes_from_ellipsoid",
@@ -67,14 +113,26 @@ void BindEllipsoid(py::module_& m) {
         const EllipsoidAxes axes = AxesFromEllipsoid(ellipsoid);
         return std::make_tuple(axes.center, axes.semi_axes, axes.orientation_xyzw);
       },
-      "ellipsoid"_a, "Centre (3,), semi-axes (3,) descending [m], orientation x y z w (4,).");
-  m.def("dual_quadric_from_ellipsoid", &DualQuadricFromEllipsoid, "ellipsoid"_a,
+      "ellipsoid"_a,
+      "Centre (3,), semi-axes (3,) descending [m], orientation x y z w (4,).");
+  m.def("dual_quadric_from_ellipsoid",
+        &DualQuadricFromEllipsoid,
+        "ellipsoid"_a,
         "q1 .. q9 of [S&M17] eq. (2) from log-Cholesky parameters, shape (9,).");
-  m.def("ellipsoid_from_dual_quadric", &EllipsoidFromDualQuadric, "quadric"_a,
+  m.def("ellipsoid_from_dual_quadric",
+        &EllipsoidFromDualQuadric,
+        "quadric"_a,
         "Log-Cholesky parameters (9,) of q1 .. q9; ValueError when q is no ellipsoid.");
-  m.def("dual_quadric_matrix", &DualQuadricMatrix, "quadric"_a,
+  m.def("dual_quadric_matrix",
+        &DualQuadricMatrix,
+        "quadric"_a,
         "The 4 x 4 matrix Q* of q1 .. q9, with Q*(4,4) = 1.");
-  m.def("project_to_boxes", &ProjectToBoxesRows, "model"_a, "camera"_a, "poses"_a, "ellipsoids"_a,
+  m.def("project_to_boxes",
+        &ProjectToBoxesRows,
+        "model"_a,
+        "camera"_a,
+        "poses"_a,
+        "ellipsoids"_a,
         "Boxes (n, 4) of ellipsoid i from pose i [undistorted px], and whether it is strictly in "
         "front (n,); NaN where it is not.");
 }

@@ -17,7 +17,8 @@ bool NoSignal() {
   return PyErr_CheckSignals() == 0;
 }
 
-Solution SolveFromPython(const Graph& graph, const SolveOptions& options,
+Solution SolveFromPython(const Graph& graph,
+                         const SolveOptions& options,
                          const std::optional<State>& start) {
   try {
     const py::gil_scoped_release no_gil;
@@ -82,42 +83,52 @@ void BindOptions(py::module_& m) {
       .def_readwrite("start", &SolveOptions::start)
       .def_readwrite("schedule", &SolveOptions::schedule)
       .def_readwrite("loss", &SolveOptions::loss)
-      .def_readwrite("loss_scale", &SolveOptions::loss_scale,
-                     "Of Huber and Cauchy, sigmas of a whole box.")
-      .def_readwrite("outlier_chi_square", &SolveOptions::outlier_chi_square,
+      .def_readwrite(
+          "loss_scale", &SolveOptions::loss_scale, "Of Huber and Cauchy, sigmas of a whole box.")
+      .def_readwrite("outlier_chi_square",
+                     &SolveOptions::outlier_chi_square,
                      "Of the other losses: a box beyond it is an outlier (4 dof).")
-      .def_readwrite("algebraic_sigma", &SolveOptions::algebraic_sigma,
+      .def_readwrite("algebraic_sigma",
+                     &SolveOptions::algebraic_sigma,
                      "Of both algebraic residuals, in their own unit.")
       .def_readwrite("minimizer", &SolveOptions::minimizer, "Of the last stage.")
       .def_readwrite("max_iterations", &SolveOptions::max_iterations, "Of each batch stage.")
-      .def_readwrite("function_tolerance", &SolveOptions::function_tolerance,
+      .def_readwrite("function_tolerance",
+                     &SolveOptions::function_tolerance,
                      "Stop when |change of cost| / cost falls below.")
       .def_readwrite("grow_poses", &SolveOptions::grow_poses, "Poses added at a time.")
-      .def_readwrite("grow_iterations", &SolveOptions::grow_iterations,
+      .def_readwrite("grow_iterations",
+                     &SolveOptions::grow_iterations,
                      "Levenberg-Marquardt steps after each addition.")
-      .def_readwrite("grow_tolerance", &SolveOptions::grow_tolerance,
-                     "Function tolerance of these steps.")
-      .def_readwrite("grow_min_views", &SolveOptions::grow_min_views,
+      .def_readwrite(
+          "grow_tolerance", &SolveOptions::grow_tolerance, "Function tolerance of these steps.")
+      .def_readwrite("grow_min_views",
+                     &SolveOptions::grow_min_views,
                      "Boxes an object needs before it is started.");
 }
 
 void BindSolution(py::module_& m) {
   py::class_<State>(m, "State", "Poses and landmark parameters: where a solve starts.")
-      .def(py::init<RowMatrix, RowMatrix>(), "poses"_a, "landmarks"_a,
+      .def(py::init<RowMatrix, RowMatrix>(),
+           "poses"_a,
+           "landmarks"_a,
            "Poses (n, d) and landmark parameters (o, 9).")
       .def_readonly("poses", &State::poses, "Shape (n, d).")
       .def_readonly("landmarks", &State::landmarks, "Shape (o, 9).");
   py::class_<Summary>(m, "Summary", "How a solve went.")
-      .def_readonly("initial_cost", &Summary::initial_cost,
+      .def_readonly("initial_cost",
+                    &Summary::initial_cost,
                     "Half the sum of squared residuals, in sigmas, after the loss.")
       .def_readonly("final_cost", &Summary::final_cost, "Likewise.")
       .def_readonly("iterations", &Summary::iterations, "Of all stages.")
       .def_readonly("rejected_steps", &Summary::rejected_steps, "Of all stages.")
-      .def_readonly("gradient_norm_start", &Summary::gradient_norm_start,
+      .def_readonly("gradient_norm_start",
+                    &Summary::gradient_norm_start,
                     "Infinity norm at the start of the last stage.")
       .def_readonly("gradient_norm_end", &Summary::gradient_norm_end, "Likewise at its end.")
       .def_readonly("seconds", &Summary::seconds, "Wall clock, all stages.")
-      .def_readonly("converged", &Summary::converged,
+      .def_readonly("converged",
+                    &Summary::converged,
                     "The last stage met a stopping test and accepted a step.")
       .def_readonly("message", &Summary::message, "How it ended, in words.")
       .def("__str__", &ToString);
@@ -125,7 +136,8 @@ void BindSolution(py::module_& m) {
       .def_readonly("poses", &Solution::poses, "Shape (n, d).")
       .def_readonly("landmarks", &Solution::landmarks, "Parameters of the model, shape (o, 9).")
       .def_readonly("dual_quadrics", &Solution::dual_quadrics, "q1 .. q9, shape (o, 9).")
-      .def_readonly("svd_singular_values", &Solution::svd_singular_values,
+      .def_readonly("svd_singular_values",
+                    &Solution::svd_singular_values,
                     "Of each object's SVD start, shape (o, 10), descending; NaN where not used.")
       .def_readonly("inliers", &Solution::inliers, "Boxes that fit their objects, shape (b,).")
       .def_readonly("summary", &Solution::summary);
@@ -137,7 +149,9 @@ void BindSolve(py::module_& m) {
   BindEnums(m);
   BindOptions(m);
   BindSolution(m);
-  m.def("solve", &SolveFromPython, "graph"_a,
+  m.def("solve",
+        &SolveFromPython,
+        "graph"_a,
         py::arg_v("options", SolveOptions(), "SolveOptions()"),
         "start"_a = std::nullopt,
         "Solve a graph, from its odometry or from a given start. Releases the GIL; Ctrl-C raises "

@@ -20,8 +20,11 @@ namespace {
 template <typename Pose, typename Landmark>
 class Assembler {
  public:
-  Assembler(const PreparedGraph& prepared, const SolveOptions& options, const Stage& stage,
-            State* state, ceres::Problem* problem)
+  Assembler(const PreparedGraph& prepared,
+            const SolveOptions& options,
+            const Stage& stage,
+            State* state,
+            ceres::Problem* problem)
       : prepared_(prepared),
         graph_(prepared.graph),
         options_(options),
@@ -66,7 +69,9 @@ class Assembler {
       problem_.AddResidualBlock(
           OdometryCost<Pose>::Create(Relative(odometry.relative.row(row).transpose()),
                                      Square(prepared_.odometry_sqrt_information[row])),
-          nullptr, PoseAt(from), PoseAt(to));
+          nullptr,
+          PoseAt(from),
+          PoseAt(to));
     }
   }
 
@@ -74,8 +79,8 @@ class Assembler {
     if (weight == 0) return;
     const int pose = graph_.boxes.pose[row], object = graph_.boxes.object[row];
     if (stage_.loss == Loss::kSwitchable) {
-      problem_.AddResidualBlock(MakeBoxCost<true>(row), nullptr, PoseAt(pose), LandmarkAt(object),
-                                &state_.switches[row]);
+      problem_.AddResidualBlock(
+          MakeBoxCost<true>(row), nullptr, PoseAt(pose), LandmarkAt(object), &state_.switches[row]);
       return;
     }
     ceres::LossFunction* loss = MakeLoss();
@@ -102,7 +107,9 @@ class Assembler {
       const Eigen::Matrix4d algebraic_weight =
           Eigen::Matrix4d::Identity() / options_.algebraic_sigma;
       return Create<kSwitched, AlgebraicCost<Pose, Landmark>>(
-          prepared_.mount, BoxLines(graph_.camera, observed), algebraic_weight,
+          prepared_.mount,
+          BoxLines(graph_.camera, observed),
+          algebraic_weight,
           residual == Residual::kAlgebraicNormalized);
     }
     const Surface<double> surface =
@@ -111,14 +118,14 @@ class Assembler {
     const EdgeFlags one_sided = OneSidedEdges(prepared_, row, surface);
     Eigen::Vector4d predicted;
     if (residual == Residual::kBox && ProjectToBox(surface, graph_.camera, &predicted)) {
-      return Create<kSwitched, BoxCost<Pose, Landmark>>(graph_.camera, prepared_.mount, observed, weight,
-                                             one_sided);
+      return Create<kSwitched, BoxCost<Pose, Landmark>>(
+          graph_.camera, prepared_.mount, observed, weight, one_sided);
     }
     // Never closer than the object is thick, so that an object behind the camera still has a scale.
     const double thickness = std::sqrt(std::max(surface.shape(2, 2), 1e-12));
     const double depth = std::max(surface.center.z(), 1.5 * thickness);
-    return Create<kSwitched, TangentCost<Pose, Landmark>>(graph_.camera, prepared_.mount, observed, weight,
-                                               depth, one_sided);
+    return Create<kSwitched, TangentCost<Pose, Landmark>>(
+        graph_.camera, prepared_.mount, observed, weight, depth, one_sided);
   }
 
   ceres::LossFunction* MakeLoss() const {
@@ -146,7 +153,9 @@ class Assembler {
       problem_.AddResidualBlock(RelativePositionCost<Pose, Landmark>::Create(
                                     Eigen::Vector3d(positions.object_in_robot.row(row)),
                                     prepared_.position_sqrt_information[row]),
-                                nullptr, PoseAt(pose), LandmarkAt(object));
+                                nullptr,
+                                PoseAt(pose),
+                                LandmarkAt(object));
     }
   }
 
@@ -155,15 +164,17 @@ class Assembler {
       if (!takes_part[object]) continue;
       problem_.AddResidualBlock(SizePriorCost::Create(graph_.size_prior.log_mean[object],
                                                       graph_.size_prior.log_sigma[object]),
-                                nullptr, LandmarkAt(object));
+                                nullptr,
+                                LandmarkAt(object));
       const ScenePriors& scene = graph_.scene_priors;
       if (scene.upright_sigma > 0) {
-        problem_.AddResidualBlock(UprightCost::Create(scene.up, scene.upright_sigma), nullptr,
-                                  LandmarkAt(object));
+        problem_.AddResidualBlock(
+            UprightCost::Create(scene.up, scene.upright_sigma), nullptr, LandmarkAt(object));
       }
       if (scene.support_sigma > 0) {
         problem_.AddResidualBlock(
-            SupportPlaneCost::Create(scene.up, scene.plane_offset, scene.support_sigma), nullptr,
+            SupportPlaneCost::Create(scene.up, scene.plane_offset, scene.support_sigma),
+            nullptr,
             LandmarkAt(object));
       }
     }
@@ -173,10 +184,13 @@ class Assembler {
     const ScenePriors& scene = graph_.scene_priors;
     if (scene.camera_height_sigma == 0) return;
     for (int pose = stage_.first_free_pose; pose < stage_.end_pose; ++pose) {
-      problem_.AddResidualBlock(
-          CameraHeightCost<Pose>::Create(prepared_.mount, scene.up, scene.plane_offset,
-                                         scene.camera_height, scene.camera_height_sigma),
-          nullptr, PoseAt(pose));
+      problem_.AddResidualBlock(CameraHeightCost<Pose>::Create(prepared_.mount,
+                                                               scene.up,
+                                                               scene.plane_offset,
+                                                               scene.camera_height,
+                                                               scene.camera_height_sigma),
+                                nullptr,
+                                PoseAt(pose));
     }
   }
 
@@ -190,8 +204,11 @@ class Assembler {
 
 }  // namespace
 
-void Assemble(const PreparedGraph& prepared, const SolveOptions& options, const Stage& stage,
-              State* state, ceres::Problem* problem) {
+void Assemble(const PreparedGraph& prepared,
+              const SolveOptions& options,
+              const Stage& stage,
+              State* state,
+              ceres::Problem* problem) {
   Dispatch(prepared.graph.pose_model, options.landmark_model, [&](auto pose, auto landmark) {
     Assembler<decltype(pose), decltype(landmark)>(prepared, options, stage, state, problem).Run();
   });

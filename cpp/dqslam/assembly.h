@@ -11,7 +11,10 @@ namespace dqslam {
 
 /// Adds poses, landmarks, odometry, boxes, positions and priors of the stage.  The problem points
 /// into `state`, which must outlive it.
-void Assemble(const PreparedGraph& prepared, const SolveOptions& options, const Stage& stage,
-              State* state, ceres::Problem* problem);
+void Assemble(const PreparedGraph& prepared,
+              const SolveOptions& options,
+              const Stage& stage,
+              State* state,
+              ceres::Problem* problem);
 
 }  // namespace dqslam

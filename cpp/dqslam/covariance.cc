@@ -50,8 +50,12 @@ class Information {
       throw std::runtime_error("covariance: a residual is undefined at this state");
     }
     const Eigen::Map<const Eigen::SparseMatrix<double, Eigen::RowMajor>> J(
-        crs.num_rows, crs.num_cols, static_cast<int>(crs.values.size()), crs.rows.data(),
-        crs.cols.data(), crs.values.data());
+        crs.num_rows,
+        crs.num_cols,
+        static_cast<int>(crs.values.size()),
+        crs.rows.data(),
+        crs.cols.data(),
+        crs.values.data());
     const Sparse column_major = J;
     matrix = Sparse(column_major.transpose()) * column_major;
   }
@@ -108,16 +112,16 @@ Covariance ComputeCovariance(const Graph& graph, const SolveOptions& options, co
   covariance.objects = RowMatrix::Zero(graph.num_objects(), kLandmarkSize * kLandmarkSize);
   int offset = 0;
   for (int b = 0; b < static_cast<int>(blocks.size()); ++b) {
-    auto row = b < free_poses ? covariance.poses.row(first + b)
-                              : covariance.objects.row(b - free_poses);
+    auto row =
+        b < free_poses ? covariance.poses.row(first + b) : covariance.objects.row(b - free_poses);
     row = blocks[b].reshaped().transpose();
     for (int i = 0; i < blocks[b].rows(); ++i) {
       if (blocks[b](i, i) * information.matrix.coeff(offset + i, offset + i) < kUndetermined) {
         continue;
       }
-      covariance.under_constrained.push_back(
-          information.NameOf(b) + ": parameter " + std::to_string(i) +
-          " is not determined by the data and the priors");
+      covariance.under_constrained.push_back(information.NameOf(b) + ": parameter " +
+                                             std::to_string(i) +
+                                             " is not determined by the data and the priors");
       row.setConstant(std::nan(""));
       break;
     }

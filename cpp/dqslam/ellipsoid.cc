@@ -7,7 +7,8 @@
 
 namespace dqslam {
 
-Eigen::Matrix<double, 4, 2> TouchingPoints(const Surface<double>& in_camera, const Camera& camera,
+Eigen::Matrix<double, 4, 2> TouchingPoints(const Surface<double>& in_camera,
+                                           const Camera& camera,
                                            const Eigen::Vector4d& box) {
   const Eigen::Vector3d& p = in_camera.center;
   const Eigen::Matrix3d conic = p * p.transpose() - in_camera.shape;  // dual, normalised
@@ -61,7 +62,8 @@ Eigen::Matrix4d DualQuadricMatrix(const Vector9d& q) {
   return Q;
 }
 
-Vector9d EllipsoidFromAxes(const Eigen::Vector3d& center, const Eigen::Vector3d& semi_axes,
+Vector9d EllipsoidFromAxes(const Eigen::Vector3d& center,
+                           const Eigen::Vector3d& semi_axes,
                            const Eigen::Vector4d& orientation_xyzw) {
   if (!semi_axes.allFinite() || (semi_axes.array() <= 0).any()) {
     throw std::invalid_argument("semi_axes must be positive and finite");
@@ -79,7 +81,8 @@ EllipsoidAxes AxesFromEllipsoid(const Vector9d& ellipsoid) {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(surface.shape);  // ascending
   Eigen::Matrix3d R = eigen.eigenvectors().rowwise().reverse();
   if (R.determinant() < 0) R.col(2) *= -1;
-  return {surface.center, eigen.eigenvalues().reverse().cwiseMax(0).cwiseSqrt(),
+  return {surface.center,
+          eigen.eigenvalues().reverse().cwiseMax(0).cwiseSqrt(),
           Eigen::Quaterniond(R).normalized().coeffs()};
 }
 

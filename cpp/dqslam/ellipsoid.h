@@ -105,8 +105,11 @@ bool ProjectToBox(const Surface<T>& in_camera, const Camera& camera, Vector4<T>*
 /// Negative where the object ends inside the box, zero at tangency, positive where it sticks out.
 /// False where n^T S n is not positive.
 template <typename T>
-bool TangentDistances(const Surface<T>& in_camera, const Camera& camera,
-                      const Eigen::Vector4d& box, double depth, Vector4<T>* distances) {
+bool TangentDistances(const Surface<T>& in_camera,
+                      const Camera& camera,
+                      const Eigen::Vector4d& box,
+                      double depth,
+                      Vector4<T>* distances) {
   using std::sqrt;
   const Vector3<T>& p = in_camera.center;
   const Matrix3<T>& S = in_camera.shape;
@@ -125,7 +128,8 @@ bool TangentDistances(const Surface<T>& in_camera, const Camera& camera,
 
 /// Where the outline touches its bounding box at each edge [px], (u, v) one a row: the pole of the
 /// edge's line.  The box is that of ProjectToBox.
-Eigen::Matrix<double, 4, 2> TouchingPoints(const Surface<double>& in_camera, const Camera& camera,
+Eigen::Matrix<double, 4, 2> TouchingPoints(const Surface<double>& in_camera,
+                                           const Camera& camera,
                                            const Eigen::Vector4d& box);
 
 /// An edge that the image border cut says only that the object goes on beyond: its error counts
@@ -158,7 +162,8 @@ struct EllipsoidAxes {
   Eigen::Vector4d orientation_xyzw;
 };
 
-Vector9d EllipsoidFromAxes(const Eigen::Vector3d& center, const Eigen::Vector3d& semi_axes,
+Vector9d EllipsoidFromAxes(const Eigen::Vector3d& center,
+                           const Eigen::Vector3d& semi_axes,
                            const Eigen::Vector4d& orientation_xyzw);
 EllipsoidAxes AxesFromEllipsoid(const Vector9d& ellipsoid);
 

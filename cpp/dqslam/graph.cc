@@ -14,7 +14,9 @@ namespace {
   throw std::invalid_argument(table + " row " + std::to_string(row) + ": " + what);
 }
 
-void CheckShape(const std::string& table, const RowMatrix& values, Eigen::Index rows,
+void CheckShape(const std::string& table,
+                const RowMatrix& values,
+                Eigen::Index rows,
                 Eigen::Index columns) {
   if (values.rows() != rows || (rows > 0 && values.cols() != columns)) {
     throw std::invalid_argument(table + " has shape (" + std::to_string(values.rows()) + ", " +
@@ -33,7 +35,8 @@ void CheckIds(const std::string& table, const IndexVector& ids, Eigen::Index row
   }
   for (Eigen::Index row = 0; row < rows; ++row) {
     if (ids[row] < 0 || ids[row] >= count) {
-      Fail(table, row,
+      Fail(table,
+           row,
            "unknown id " + std::to_string(ids[row]) + ", there are " + std::to_string(count));
     }
   }
@@ -111,8 +114,8 @@ void ValidateBoxes(const Graph& graph) {
 }
 
 void ValidateScenePriors(const ScenePriors& priors) {
-  const Eigen::Vector4d numbers(priors.plane_offset, priors.upright_sigma, priors.support_sigma,
-                                priors.camera_height_sigma);
+  const Eigen::Vector4d numbers(
+      priors.plane_offset, priors.upright_sigma, priors.support_sigma, priors.camera_height_sigma);
   if (!priors.up.allFinite() || std::abs(priors.up.norm() - 1) > 1e-6) {
     throw std::invalid_argument("scene_priors: up must be a unit vector");
   }

@@ -43,7 +43,7 @@ struct SizePriorTable {
 /// What is known of the scene; each part is off while its sigma is 0.
 struct ScenePriors {
   Eigen::Vector3d up = Eigen::Vector3d::UnitZ();  ///< unit normal n of the ground, in the world
-  double plane_offset = 0;         ///< d of the ground n.x + d = 0, metres
+  double plane_offset = 0;                        ///< d of the ground n.x + d = 0, metres
   double upright_sigma = 0;        ///< radians: a principal axis of each object is vertical
   double support_sigma = 0;        ///< metres: each object stands on the ground
   double camera_height = 0;        ///< metres above the ground
@@ -69,15 +69,15 @@ struct Graph {
 };
 
 /// Throws std::invalid_argument naming the table and the row for NaN or infinite numbers, wrong
-/// shapes, ids out of range, inverted boxes, covariances that are not positive definite, quaternions
-/// that are not unit, non-positive sigmas, poses without odometry from an earlier pose (unless
-/// `poses_known`) and objects that no box shows.
+/// shapes, ids out of range, inverted boxes, covariances that are not positive definite,
+/// quaternions that are not unit, non-positive sigmas, poses without odometry from an earlier pose
+/// (unless `poses_known`) and objects that no box shows.
 void Validate(const Graph& graph, bool poses_known);
 
 /// Poses and landmarks: where a solve starts, stands and ends.
 struct State {
-  RowMatrix poses;      ///< (poses, d)
-  RowMatrix landmarks;  ///< (objects, 9) in the landmark model of the solve
+  RowMatrix poses;                ///< (poses, d)
+  RowMatrix landmarks;            ///< (objects, 9) in the landmark model of the solve
   Eigen::VectorXd switches = {};  ///< (boxes) of switchable constraints: 1 believed, 0 not
 };
 

@@ -13,19 +13,24 @@ Vector9d InModel(const Vector9d& ellipsoid, LandmarkModel model) {
 
 }  // namespace
 
-std::vector<View> ViewsOf(const PreparedGraph& prepared, const State& state,
+std::vector<View> ViewsOf(const PreparedGraph& prepared,
+                          const State& state,
                           const std::vector<int>& boxes) {
   std::vector<View> views;
   for (const int row : boxes) {
     views.push_back({LocateCamera(prepared, state, prepared.graph.boxes.pose[row]),
-                     prepared.graph.boxes.box.row(row), prepared.box_sqrt_information[row],
+                     prepared.graph.boxes.box.row(row),
+                     prepared.box_sqrt_information[row],
                      prepared.graph.boxes.truncated.row(row)});
   }
   return views;
 }
 
-Vector9d StartObject(const PreparedGraph& prepared, const SolveOptions& options,
-                     const State& state, int object, const std::vector<int>& boxes) {
+Vector9d StartObject(const PreparedGraph& prepared,
+                     const SolveOptions& options,
+                     const State& state,
+                     int object,
+                     const std::vector<int>& boxes) {
   const Graph& graph = prepared.graph;
   const std::vector<View> views = ViewsOf(prepared, state, boxes);
   const SizePrior prior{graph.size_prior.log_mean[object], graph.size_prior.log_sigma[object]};
@@ -52,7 +57,9 @@ Vector9d StartObject(const PreparedGraph& prepared, const SolveOptions& options,
   return InModel(FitSphere(graph.camera, views, prior), options.landmark_model);
 }
 
-Summary Grow(const PreparedGraph& prepared, const SolveOptions& options, const Monitor& monitor,
+Summary Grow(const PreparedGraph& prepared,
+             const SolveOptions& options,
+             const Monitor& monitor,
              State* state) {
   const Graph& graph = prepared.graph;
   std::vector<bool> started(graph.num_objects(), false);
@@ -75,8 +82,8 @@ Summary Grow(const PreparedGraph& prepared, const SolveOptions& options, const M
       if (started[object]) stage.boxes.insert(stage.boxes.end(), seen.begin(), seen.end());
     }
     if (stage.boxes.empty()) continue;
-    stage.residual = options.residual == Residual::kTangentThenBox ? Residual::kTangent
-                                                                   : options.residual;
+    stage.residual =
+        options.residual == Residual::kTangentThenBox ? Residual::kTangent : options.residual;
     stage.loss = IsRobust(options.loss) ? Loss::kCauchy : Loss::kNone;
     stage.minimizer = Minimizer::kLevenbergMarquardt;
     stage.max_iterations = options.grow_iterations;

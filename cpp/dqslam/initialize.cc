@@ -26,7 +26,8 @@ Vector3d EdgeNormal(const Camera& camera, const Vector4d& box, int edge) {
 
 Vector3d RayInWorld(const Camera& camera, const View& view) {
   const Vector3d ray((0.5 * (view.box[0] + view.box[2]) - camera.cx) / camera.fx,
-                     (0.5 * (view.box[1] + view.box[3]) - camera.cy) / camera.fy, 1);
+                     (0.5 * (view.box[1] + view.box[3]) - camera.cy) / camera.fy,
+                     1);
   return view.camera.camera_from_world.transpose() * ray;
 }
 
@@ -93,8 +94,7 @@ Vector9d IdentityQuadric() {
   return (Vector9d() << 1, 0, 0, 0, 1, 0, 0, 1, 0).finished();
 }
 
-Vector9d BackProject(const Camera& camera, const std::vector<View>& views,
-                     const SizePrior& prior) {
+Vector9d BackProject(const Camera& camera, const std::vector<View>& views, const SizePrior& prior) {
   const double radius = std::exp(prior.log_mean);
   Vector3d center = Vector3d::Zero();
   for (const View& view : views) {

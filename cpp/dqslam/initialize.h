@@ -24,7 +24,7 @@ struct SizePrior {
 
 /// The paper's linear fit.  [S&M17] eqs. (9), (10)
 struct SvdFit {
-  Vector9d quadric;                            ///< of any signature
+  Vector9d quadric;                              ///< of any signature
   Eigen::Matrix<double, 10, 1> singular_values;  ///< descending, of unit planes
   bool degenerate = false;  ///< the null space is not one vector: planar motion does that
 };

@@ -45,9 +45,8 @@ class MonitorCallback : public ceres::IterationCallback {
 
 ceres::Solver::Options CeresOptions(const Stage& stage) {
   ceres::Solver::Options ceres_options;
-  ceres_options.trust_region_strategy_type = stage.minimizer == Minimizer::kDogleg
-                                                 ? ceres::DOGLEG
-                                                 : ceres::LEVENBERG_MARQUARDT;
+  ceres_options.trust_region_strategy_type =
+      stage.minimizer == Minimizer::kDogleg ? ceres::DOGLEG : ceres::LEVENBERG_MARQUARDT;
   ceres_options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
   ceres_options.max_num_iterations = stage.max_iterations;
   ceres_options.function_tolerance = stage.function_tolerance;
@@ -85,8 +84,11 @@ Summary Summarize(const ceres::Solver::Summary& ceres_summary, const MonitorCall
 
 }  // namespace
 
-Summary Optimize(const PreparedGraph& prepared, const SolveOptions& options, const Stage& stage,
-                 const Monitor& monitor, State* state) {
+Summary Optimize(const PreparedGraph& prepared,
+                 const SolveOptions& options,
+                 const Stage& stage,
+                 const Monitor& monitor,
+                 State* state) {
   const SingleOpenMpThread single_thread;
   ceres::Problem problem;
   Assemble(prepared, options, stage, state, &problem);
@@ -101,7 +103,8 @@ Summary Optimize(const PreparedGraph& prepared, const SolveOptions& options, con
   return Summarize(ceres_summary, callback);
 }
 
-Eigen::VectorXd BoxCosts(const PreparedGraph& prepared, const SolveOptions& options,
+Eigen::VectorXd BoxCosts(const PreparedGraph& prepared,
+                         const SolveOptions& options,
                          const State& state) {
   const Graph& graph = prepared.graph;
   Eigen::VectorXd costs(graph.boxes.size());

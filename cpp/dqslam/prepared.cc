@@ -40,8 +40,9 @@ PreparedGraph::PreparedGraph(const Graph& graph, bool poses_known)
     boxes_of_object[graph.boxes.object[row]].push_back(row);
   }
   for (std::vector<int>& rows : boxes_of_object) {
-    std::stable_sort(rows.begin(), rows.end(),
-                     [&](int a, int b) { return graph.boxes.pose[a] < graph.boxes.pose[b]; });
+    std::stable_sort(rows.begin(), rows.end(), [&](int a, int b) {
+      return graph.boxes.pose[a] < graph.boxes.pose[b];
+    });
   }
   odometry_into.assign(graph.num_poses(), -1);
   for (int row = 0; row < graph.odometry.size(); ++row) {

@@ -23,7 +23,8 @@ bool KeepIfBetter(const State& attempt, const Summary& total, State* state, Summ
 
 }  // namespace
 
-std::vector<bool> StuckObjects(const PreparedGraph& prepared, const SolveOptions& options,
+std::vector<bool> StuckObjects(const PreparedGraph& prepared,
+                               const SolveOptions& options,
                                const State& state) {
   const Eigen::VectorXd costs = BoxCosts(prepared, options, state);
   std::vector<bool> stuck;
@@ -52,8 +53,11 @@ Stage BatchStage(const PreparedGraph& prepared, const SolveOptions& options) {
   return stage;
 }
 
-void RestartStuckObjects(const PreparedGraph& prepared, const SolveOptions& options,
-                         const Monitor& monitor, State* state, Summary* summary) {
+void RestartStuckObjects(const PreparedGraph& prepared,
+                         const SolveOptions& options,
+                         const Monitor& monitor,
+                         State* state,
+                         Summary* summary) {
   const Stage all = BatchStage(prepared, options);
   for (int restart = 0; restart < kMaxRestarts; ++restart) {
     const std::vector<bool> stuck = StuckObjects(prepared, options, *state);
@@ -81,8 +85,11 @@ void RestartStuckObjects(const PreparedGraph& prepared, const SolveOptions& opti
   }
 }
 
-void TryOtherDepths(const PreparedGraph& prepared, const SolveOptions& options,
-                    const Monitor& monitor, State* state, Summary* summary) {
+void TryOtherDepths(const PreparedGraph& prepared,
+                    const SolveOptions& options,
+                    const Monitor& monitor,
+                    State* state,
+                    Summary* summary) {
   SolveOptions by_size = options;
   by_size.start = Start::kSizePrior;
   for (int object = 0; object < prepared.graph.num_objects(); ++object) {

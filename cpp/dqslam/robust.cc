@@ -8,7 +8,7 @@
 namespace dqslam {
 namespace {
 
-constexpr double kGraduation = 1.6;  // of the control parameter, each round
+constexpr double kGraduation = 1.6;     // of the control parameter, each round
 constexpr double kLargestAtStart = 10;  // chi-square, in thresholds
 constexpr int kMaxRounds = 60;
 constexpr int kRoundIterations = 15;
@@ -25,10 +25,14 @@ double Weight(Loss loss, double s, double c2, double mu) {
 
 }  // namespace
 
-bool IsRobust(Loss loss) { return loss != Loss::kNone; }
+bool IsRobust(Loss loss) {
+  return loss != Loss::kNone;
+}
 
-Summary GraduateNonConvexity(const PreparedGraph& prepared, const SolveOptions& options,
-                             const Monitor& monitor, State* state) {
+Summary GraduateNonConvexity(const PreparedGraph& prepared,
+                             const SolveOptions& options,
+                             const Monitor& monitor,
+                             State* state) {
   const bool truncated = options.loss == Loss::kGncTls;
   const double c2 = options.outlier_chi_square;
   Stage stage = BatchStage(prepared, options);
@@ -66,7 +70,8 @@ Summary GraduateNonConvexity(const PreparedGraph& prepared, const SolveOptions& 
   return total;
 }
 
-std::vector<bool> InlierBoxes(const PreparedGraph& prepared, const SolveOptions& options,
+std::vector<bool> InlierBoxes(const PreparedGraph& prepared,
+                              const SolveOptions& options,
                               const State& state) {
   const Eigen::VectorXd costs = BoxCosts(prepared, options, state);
   std::vector<bool> inliers;

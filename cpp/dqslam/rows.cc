@@ -9,7 +9,9 @@
 namespace dqslam {
 namespace {
 
-void RequireShape(const char* name, const RowMatrix& table, Eigen::Index rows,
+void RequireShape(const char* name,
+                  const RowMatrix& table,
+                  Eigen::Index rows,
                   Eigen::Index columns) {
   if (table.rows() == rows && table.cols() == columns) return;
   throw std::invalid_argument(std::string(name) + " has shape (" + std::to_string(table.rows()) +
@@ -100,8 +102,10 @@ RowMatrix WorldFromCameraRows(PoseModel model, const Camera& camera, const RowMa
   });
 }
 
-std::pair<RowMatrix, Mask> ProjectToBoxesRows(PoseModel model, const Camera& camera,
-                                              const RowMatrix& poses, const RowMatrix& ellipsoids) {
+std::pair<RowMatrix, Mask> ProjectToBoxesRows(PoseModel model,
+                                              const Camera& camera,
+                                              const RowMatrix& poses,
+                                              const RowMatrix& ellipsoids) {
   return Dispatch(model, [&](auto pose) {
     using Pose = decltype(pose);
     RequireShape("poses", poses, poses.rows(), Pose::kSize);
@@ -113,7 +117,8 @@ std::pair<RowMatrix, Mask> ProjectToBoxesRows(PoseModel model, const Camera& cam
       Eigen::Vector4d box;
       in_front[i] = ProjectToBox(ToCamera(LocateCamera<Pose>(poses.row(i).data(), mount),
                                           EllipsoidModel::Unpack(ellipsoids.row(i).data())),
-                                 camera, &box);
+                                 camera,
+                                 &box);
       if (!in_front[i]) box.setConstant(std::numeric_limits<double>::quiet_NaN());
       boxes.row(i) = box;
     }

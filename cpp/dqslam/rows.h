@@ -25,7 +25,9 @@ RowMatrix WorldFromCameraRows(PoseModel model, const Camera& camera, const RowMa
 
 /// Box of ellipsoid i from pose i [undistorted px], shape (n, 4), and whether it is strictly in
 /// front; NaN where it is not.
-std::pair<RowMatrix, Mask> ProjectToBoxesRows(PoseModel model, const Camera& camera,
-                                              const RowMatrix& poses, const RowMatrix& ellipsoids);
+std::pair<RowMatrix, Mask> ProjectToBoxesRows(PoseModel model,
+                                              const Camera& camera,
+                                              const RowMatrix& poses,
+                                              const RowMatrix& ellipsoids);
 
 }  // namespace dqslam

@@ -59,8 +59,7 @@ class Solver {
     State state{graph_.initial_poses, RowMatrix()};
     RowMatrix values = RowMatrix::Constant(graph_.num_objects(), 10, std::nan(""));
     for (int object = 0; object < graph_.num_objects(); ++object) {
-      const std::vector<View> views =
-          ViewsOf(prepared_, state, prepared_.boxes_of_object[object]);
+      const std::vector<View> views = ViewsOf(prepared_, state, prepared_.boxes_of_object[object]);
       if (views.size() >= 3) values.row(object) = FitSvd(graph_.camera, views).singular_values;
     }
     return values;
@@ -129,8 +128,11 @@ class Solver {
 // Grows again in smaller steps, up to two times, where objects are stuck or the last stage did not
 // converge, and keeps the lowest cost.  With a robust loss an object may well have outliers only:
 // there it grows once.
-Summary SolveInAttempts(const Graph& graph, const SolveOptions& options,
-                        const std::optional<State>& start, const Monitor& monitor, State* state) {
+Summary SolveInAttempts(const Graph& graph,
+                        const SolveOptions& options,
+                        const std::optional<State>& start,
+                        const Monitor& monitor,
+                        State* state) {
   const bool repeats = !start && options.mode == Mode::kSlam && options.loss == Loss::kNone &&
                        options.schedule == Schedule::kGrow &&
                        options.residual == Residual::kTangentThenBox;
@@ -152,7 +154,9 @@ Summary SolveInAttempts(const Graph& graph, const SolveOptions& options,
 
 }  // namespace
 
-Solution Solve(const Graph& graph, const SolveOptions& options, const std::optional<State>& start,
+Solution Solve(const Graph& graph,
+               const SolveOptions& options,
+               const std::optional<State>& start,
                const Monitor& monitor) {
   const auto begin = std::chrono::steady_clock::now();
   ValidateOptions(options);

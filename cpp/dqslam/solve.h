@@ -20,7 +20,9 @@ struct Solution {
 
 /// Solves from the odometry, or from `start` where it is given (parameters of the landmark model).
 /// Throws std::invalid_argument for bad input and Interrupted when the monitor asks to stop.
-Solution Solve(const Graph& graph, const SolveOptions& options, const std::optional<State>& start,
+Solution Solve(const Graph& graph,
+               const SolveOptions& options,
+               const std::optional<State>& start,
                const Monitor& monitor = nullptr);
 
 }  // namespace dqslam

@@ -19,7 +19,8 @@ inline std::array<Eigen::Vector3d, 4> BoxLines(const Camera& camera, const Eigen
   K << camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, 1;
   const Eigen::Vector3d top_left(box[0], box[1], 1), top_right(box[2], box[1], 1),
       bottom_right(box[2], box[3], 1), bottom_left(box[0], box[3], 1);
-  return {K.transpose() * bottom_left.cross(top_left), K.transpose() * top_left.cross(top_right),
+  return {K.transpose() * bottom_left.cross(top_left),
+          K.transpose() * top_left.cross(top_right),
           K.transpose() * top_right.cross(bottom_right),
           K.transpose() * bottom_right.cross(bottom_left)};
 }

@@ -32,7 +32,8 @@ class DcsLoss : public ceres::LossFunction {
 };
 
 /// Switchable constraints, Suenderhauf & Protzel 2012:  r = (w e, (1 - w) sqrt(phi)).
-/// Blocks: those of the box cost, and the switch [1].  Residual: [5].  Fails where the box cost does.
+/// Blocks: those of the box cost, and the switch [1].  Residual: [5].  Fails where the box cost
+/// does.
 template <typename Pose, typename BoxResidual>
 struct SwitchedCost : AutoDiffCost<SwitchedCost<Pose, BoxResidual>, 5, Pose::kSize, 9, 1> {
   BoxResidual box;

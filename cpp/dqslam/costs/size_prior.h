@@ -3,8 +3,8 @@
 // any orientation of the object and of the world frame.
 //
 // Blocks: ellipsoid [9].  Residual: [6], in sigmas.
-// Returns false where the ratio of the longest to the shortest semi-axis exceeds 10^5: such a disc or
-// needle is a step gone wrong, and its eigenvalues have no digits left.
+// Returns false where the ratio of the longest to the shortest semi-axis exceeds 10^5: such a disc
+// or needle is a step gone wrong, and its eigenvalues have no digits left.
 #pragma once
 
 #include <ceres/jet.h>
