@@ -12,6 +12,7 @@ import numpy.typing
 
 __all__: list[str] = [
     "Camera",
+    "Covariance",
     "Graph",
     "LandmarkModel",
     "Loss",
@@ -19,6 +20,7 @@ __all__: list[str] = [
     "Mode",
     "PoseModel",
     "Residual",
+    "ScenePriors",
     "Schedule",
     "Solution",
     "SolveOptions",
@@ -28,6 +30,7 @@ __all__: list[str] = [
     "axes_from_ellipsoid",
     "between",
     "compose",
+    "covariance",
     "dead_reckon",
     "dual_quadric_from_ellipsoid",
     "dual_quadric_matrix",
@@ -128,6 +131,59 @@ class Camera:
         Pixels.
         """
 
+class ScenePriors:
+    """
+    What is known of the scene; each part is off while its sigma is 0.
+    """
+    def __init__(self, **kwargs: typing.Any) -> None:
+        """
+        Any of the attributes as keywords.
+        """
+    @property
+    def camera_height(self) -> float:
+        """
+        Metres above the ground.
+        """
+    @camera_height.setter
+    def camera_height(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def camera_height_sigma(self) -> float:
+        """
+        Metres.
+        """
+    @camera_height_sigma.setter
+    def camera_height_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def plane_offset(self) -> float:
+        """
+        d of the ground n.x + d = 0, metres.
+        """
+    @plane_offset.setter
+    def plane_offset(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def support_sigma(self) -> float:
+        """
+        Each object stands on the ground: metres.
+        """
+    @support_sigma.setter
+    def support_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def up(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        Unit normal n of the ground, in the world, (3,).
+        """
+    @up.setter
+    def up(
+        self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]
+    ) -> None: ...
+    @property
+    def upright_sigma(self) -> float:
+        """
+        A principal axis of each object is vertical: radians.
+        """
+    @upright_sigma.setter
+    def upright_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+
 class Graph:
     """
     The problem as plain tables; ids are row numbers. Immutable.
@@ -146,6 +202,7 @@ class Graph:
         box_object: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
         boxes: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
         box_covariance: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+        box_truncated: typing.Annotated[numpy.typing.ArrayLike, numpy.bool, "[m, n]"] | None = None,
         position_pose: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"] = ...,
         position_object: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"] = ...,
         positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"] = ...,
@@ -154,9 +211,10 @@ class Graph:
         ] = ...,
         log_size_mean: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
         log_size_sigma: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        scene_priors: ScenePriors = ...,
     ) -> None:
         """
-        Shapes, with d the size of a pose and k of its tangent: initial_poses (n, d); odometry (m, d), to_in_from, with covariance (m, k * k); boxes (b, 4) undistorted pixels with covariance (b, 16); positions (p, 3) object_in_robot, metres, with covariance (p, 9); log_size_mean and log_size_sigma (o,), of semi-axes in log metres.
+        Shapes, with d the size of a pose and k of its tangent: initial_poses (n, d); odometry (m, d), to_in_from, with covariance (m, k * k); boxes (b, 4) undistorted pixels with covariance (b, 16) and box_truncated (b, 4), edges cut by the image border; positions (p, 3) object_in_robot, metres, with covariance (p, 9); log_size_mean and log_size_sigma (o,), of semi-axes in log metres.
         """
     @property
     def box_covariance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]: ...
@@ -164,6 +222,8 @@ class Graph:
     def box_object(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]: ...
     @property
     def box_pose(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]: ...
+    @property
+    def box_truncated(self) -> typing.Annotated[numpy.typing.NDArray[numpy.bool], "[m, n]"]: ...
     @property
     def boxes(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]: ...
     @property
@@ -203,6 +263,8 @@ class Graph:
     def position_pose(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]: ...
     @property
     def positions(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]: ...
+    @property
+    def scene_priors(self) -> ScenePriors: ...
 
 class Mode(enum.Enum):
     """
@@ -255,8 +317,12 @@ class Loss(enum.Enum):
     """
 
     CAUCHY = 2
+    DCS = 3
+    GNC_GM = 6
+    GNC_TLS = 5
     HUBER = 1
     NONE = 0
+    SWITCHABLE = 4
 
 class Minimizer(enum.Enum):
     """
@@ -317,9 +383,16 @@ class SolveOptions:
     @grow_poses.setter
     def grow_poses(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
     @property
+    def grow_tolerance(self) -> float:
+        """
+        Function tolerance of these steps.
+        """
+    @grow_tolerance.setter
+    def grow_tolerance(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
     def loss_scale(self) -> float:
         """
-        Sigmas of a whole box.
+        Of Huber and Cauchy, sigmas of a whole box.
         """
     @loss_scale.setter
     def loss_scale(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
@@ -337,6 +410,13 @@ class SolveOptions:
         """
     @minimizer.setter
     def minimizer(self, arg0: Minimizer) -> None: ...
+    @property
+    def outlier_chi_square(self) -> float:
+        """
+        Of the other losses: a box beyond it is an outlier (4 dof).
+        """
+    @outlier_chi_square.setter
+    def outlier_chi_square(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
 
 class State:
     """
@@ -422,6 +502,11 @@ class Solution:
         q1 .. q9, shape (o, 9).
         """
     @property
+    def inliers(self) -> typing.Annotated[numpy.typing.NDArray[numpy.bool], "[m, 1]"]:
+        """
+        Boxes that fit their objects, shape (b,).
+        """
+    @property
     def landmarks(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
         """
         Parameters of the model, shape (o, 9).
@@ -439,6 +524,26 @@ class Solution:
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
         """
         Of each object's SVD start, shape (o, 10), descending; NaN where not used.
+        """
+
+class Covariance:
+    """
+    Marginal covariances; the first pose is the gauge.
+    """
+    @property
+    def objects(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Of the landmark parameters, shape (o, 81); NaN where under-constrained.
+        """
+    @property
+    def poses(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        In the frames of the poses, shape (n, k * k); NaN where under-constrained.
+        """
+    @property
+    def under_constrained(self) -> list[str]:
+        """
+        One sentence for each pose or object that nothing determines.
         """
 
 def axes_from_ellipsoid(
@@ -468,6 +573,11 @@ def compose(
 ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
     """
     Compose poses row by row: a_from_c, shape (n, d).
+    """
+
+def covariance(graph: Graph, options: SolveOptions, state: State) -> Covariance:
+    """
+    Marginal covariances at a state; at the true state, the posterior Cramer-Rao bound.
     """
 
 def dead_reckon(
