@@ -29,6 +29,10 @@ bool IsRobust(Loss loss) {
   return loss != Loss::kNone;
 }
 
+bool ThrowsBoxesOut(Loss loss) {
+  return IsRobust(loss) && loss != Loss::kHuber && loss != Loss::kCauchy;
+}
+
 Summary GraduateNonConvexity(const PreparedGraph& prepared,
                              const SolveOptions& options,
                              const Monitor& monitor,

@@ -8,6 +8,9 @@ namespace dqslam {
 /// Whether a loss doubts boxes at all.
 bool IsRobust(Loss loss);
 
+/// Whether a loss throws boxes out by their chi-square at the state, which must have settled first.
+bool ThrowsBoxesOut(Loss loss);
+
 /// Graduated non-convexity, Yang et al. 2020, truncated least squares or Geman-McClure, on whole
 /// boxes; odometry is a known inlier.  Starts at the state; weights are 0 or 1 at the end.
 Summary GraduateNonConvexity(const PreparedGraph& prepared,

@@ -81,11 +81,14 @@ class Solver {
     } else {
       summary = ReachStart(state);
     }
+    if (ThrowsBoxesOut(options_.loss)) {
+      Append(Batch(BatchStage(prepared_, options_).residual, Loss::kCauchy, state), &summary);
+    }
     if (options_.loss == Loss::kGncTls || options_.loss == Loss::kGncGm) {
       Append(GraduateNonConvexity(prepared_, options_, monitor_, state), &summary);
       return summary;
     }
-    Append(Batch(BatchStage(prepared_, options_).residual, state), &summary);
+    Append(Batch(BatchStage(prepared_, options_).residual, options_.loss, state), &summary);
     if (Refines()) {
       RestartStuckObjects(prepared_, options_, monitor_, state, &summary);
       TryOtherDepths(prepared_, options_, monitor_, state, &summary);
@@ -103,7 +106,8 @@ class Solver {
       return Grow(prepared_, options_, monitor_, state);
     }
     StartAll(state);
-    return Refines() ? Batch(Residual::kTangent, state) : Summary();
+    const Loss loss = IsRobust(options_.loss) ? Loss::kCauchy : Loss::kNone;
+    return Refines() ? Batch(Residual::kTangent, loss, state) : Summary();
   }
 
   void StartAll(State* state) {
@@ -113,9 +117,10 @@ class Solver {
     }
   }
 
-  Summary Batch(Residual residual, State* state) {
+  Summary Batch(Residual residual, Loss loss, State* state) {
     Stage stage = BatchStage(prepared_, options_);
     stage.residual = residual;
+    stage.loss = loss;
     return Optimize(prepared_, options_, stage, monitor_, state);
   }
 
