@@ -128,6 +128,8 @@ def test_ctrl_c_is_one_line_and_exit_code_130(tmp_path, seconds):
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
+        # A test run in the background of a shell ignores Ctrl-C, and hands that on.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     while not out.exists() and run.poll() is None:
         time.sleep(0.01)
