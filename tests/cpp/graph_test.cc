@@ -19,7 +19,8 @@ const double kNan = std::nan("");
 /// Three poses, with a measured position.
 template <typename Pose>
 Graph GoodGraph() {
-  Graph graph = MakeScene<Pose>(3, 0.05).graph;
+  static const Scene scene = MakeScene<Pose>(3, 0.05);
+  Graph graph = scene.graph;
   graph.positions.pose = IndexVector::Constant(1, 2);
   graph.positions.object = IndexVector::Constant(1, 1);
   graph.positions.object_in_robot = RowMatrix::Ones(1, 3);

@@ -47,6 +47,12 @@ RowMatrix AsDualQuadrics(const RowMatrix& ellipsoids) {
 }
 
 template <typename Pose>
+const Scene& SharedScene() {
+  static const Scene scene = MakeScene<Pose>();
+  return scene;
+}
+
+template <typename Pose>
 class SolveOf : public testing::Test {
  protected:
   void ExpectTruth(const Solution& solution, double tolerance = 1e-6) {
@@ -57,7 +63,7 @@ class SolveOf : public testing::Test {
         << ToString(solution.summary);
   }
 
-  Scene scene_ = MakeScene<Pose>();
+  const Scene& scene_ = SharedScene<Pose>();
   SolveOptions options_;
 };
 
@@ -174,7 +180,7 @@ class SolveTest : public testing::Test {
     }
   }
 
-  Scene scene_ = MakeScene<Se2>();
+  const Scene& scene_ = SharedScene<Se2>();
   SolveOptions options_;
 };
 
