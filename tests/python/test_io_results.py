@@ -5,7 +5,16 @@ import pytest
 
 from dqslam import _core
 from dqslam.estimate import Estimate
-from dqslam.io import FileError, read_trajectory, save_estimate, write_json
+from dqslam.io import (
+    FileError,
+    load_results,
+    read_camera,
+    read_trajectory,
+    save_estimate,
+    write_json,
+)
+from dqslam.recording import Detections
+from dqslam.uncertainty import Marginals
 
 CENTER = [1.0, -2.0, 0.5]
 AXES = [0.4, 0.2, 0.1]
@@ -97,3 +106,161 @@ def test_a_failed_write_leaves_the_old_file_and_nothing_else(tmp_path):
         write_json(tmp_path / "b", {"new": 1})
     assert json.loads((tmp_path / "a.json").read_text()) == {"old": 1}
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.json", "b"]
+
+
+# --- boxes, covariances, and back -----------------------------------------------------------------
+
+INLIERS = np.array([True, False])
+
+
+def detections():
+    """Return four boxes: used and fitting, of no object, held out, used but not fitting."""
+    return Detections(
+        pose=[0, 0, 1, 1],
+        box=[[10.12345, 20, 30, 40], [1, 2, 3, 4], [5, 6, 7, 8], [-0.5, 9, 20, 479.5]],
+        score=[0.9, 0.25, 1, 0.5],
+        class_id=[2, 2, 7, 7],
+        object_id=[3, -1, 8, 8],
+        class_names={2: "cup", 7: 'tv "[red]", big'},
+        truncated=np.array([[0, 0, 0, 0]] * 3 + [[1, 0, 0, 1]]),
+    )
+
+
+HELD_OUT = np.array([False, False, True, False])
+
+
+def save_all(folder):
+    marginals = Marginals(np.zeros((2, 6, 6)), np.array([np.diag(VARIANCES)] * 2), ())
+    save_estimate(
+        estimate(inliers=INLIERS, dropped={4: "too few"}),
+        folder,
+        detections=detections(),
+        held_out=HELD_OUT,
+        marginals=marginals,
+    )
+
+
+VARIANCES = np.arange(1.0, 10.0)
+
+
+def test_everything_comes_back(tmp_path):
+    save_all(tmp_path)
+    found = load_results(tmp_path)
+    np.testing.assert_array_equal(found.timestamps, estimate().timestamps)
+    np.testing.assert_array_equal(found.world_from_camera, estimate().poses)
+    np.testing.assert_array_equal(found.odometry, estimate().initial_poses)
+    assert found.report == {}
+    boxes = found.boxes
+    assert len(boxes) == 4
+    np.testing.assert_array_equal(boxes.pose, [0, 0, 1, 1])
+    np.testing.assert_allclose(boxes.box, detections().box, atol=5.1e-5)
+    np.testing.assert_array_equal(boxes.truncated, detections().truncated)
+    np.testing.assert_array_equal(boxes.score, [0.9, 0.25, 1, 0.5])
+    np.testing.assert_array_equal(boxes.class_id, [2, 2, 7, 7])
+    assert boxes.class_name == ("cup", "cup", 'tv "[red]", big', 'tv "[red]", big')
+    np.testing.assert_array_equal(boxes.object_id, [3, -1, 8, 8])
+    np.testing.assert_array_equal(boxes.inlier, [True, False, False, False])
+    np.testing.assert_array_equal(boxes.held_out, HELD_OUT)
+    objects = found.objects
+    np.testing.assert_array_equal(objects.id, [3, 8])
+    assert objects.class_name == ("cup", 'tv "[red]"')
+    np.testing.assert_array_equal(objects.observations, [12, 5])
+    np.testing.assert_array_equal(objects.is_ellipsoid, [True, False])
+    np.testing.assert_allclose(objects.ellipsoids, estimate().ellipsoids, atol=1e-12)
+    np.testing.assert_array_equal(objects.center_covariance[0], np.diag([1.0, 2, 3]))
+    assert np.isnan(objects.center_covariance[1]).all()
+    assert objects.dropped == {4: "too few"}
+
+
+def test_camera_comes_back(tmp_path):
+    camera = _core.Camera(500.5, 501, 320, 240, 640, 480, distortion=[0.1, -0.2, 1e-3, 2e-3, 0.05])
+    save_estimate(estimate(camera=camera), tmp_path)
+    found = read_camera(tmp_path / "camera.json")
+    for name in ("fx", "fy", "cx", "cy", "width", "height"):
+        assert getattr(found, name) == getattr(camera, name)
+    np.testing.assert_array_equal(found.distortion, camera.distortion)
+
+
+def test_sigma_of_semi_axes_is_that_of_many_draws(tmp_path):
+    """Draw shapes from the covariance of their parameters, and look at their axes."""
+    random = np.random.default_rng(3)
+    factor = 0.001 * random.normal(size=(9, 9))
+    covariance = factor @ factor.T
+    marginals = Marginals(np.zeros((2, 6, 6)), np.array([covariance, covariance]), ())
+    save_estimate(estimate(), tmp_path, marginals=marginals)
+    sigma = load_results(tmp_path).objects.log_semi_axes_sigma[0]
+    draws = random.multivariate_normal(estimate().ellipsoids[0], covariance, 4000)
+    axes = np.array([_core.axes_from_ellipsoid(draw)[1] for draw in draws])
+    np.testing.assert_allclose(sigma, np.log(axes).std(axis=0), rtol=0.05)
+
+
+def test_an_object_that_nothing_determines_has_no_covariance(tmp_path):
+    marginals = Marginals(np.zeros((2, 6, 6)), np.full((2, 9, 9), np.nan), ("object 3: free",))
+    save_estimate(estimate(), tmp_path, marginals=marginals)
+    assert "center_covariance" not in (tmp_path / "map.json").read_text()
+    assert np.isnan(load_results(tmp_path).objects.log_semi_axes_sigma).all()
+
+
+def test_without_boxes_an_older_file_of_them_goes(tmp_path):
+    save_all(tmp_path)
+    save_estimate(estimate(), tmp_path)
+    assert not (tmp_path / "boxes.csv").exists()
+    assert load_results(tmp_path).boxes is None
+
+
+def test_boxes_of_another_estimate_are_refused(tmp_path):
+    message = "3 boxes have an object and are not held out, but the estimate is of 2"
+    with pytest.raises(ValueError, match=message):
+        save_estimate(estimate(inliers=INLIERS), tmp_path, detections=detections())
+
+
+def test_an_empty_map_without_boxes_comes_back(tmp_path):
+    nothing = detections().select(np.zeros(4, dtype=bool))
+    empty = estimate(
+        object_ids=np.zeros(0, dtype=int),
+        class_names=(),
+        observations=np.zeros(0, dtype=int),
+        dual_quadrics=np.zeros((0, 9)),
+        ellipsoids=np.zeros((0, 9)),
+    )
+    save_estimate(empty, tmp_path, detections=nothing)
+    found = load_results(tmp_path)
+    assert (len(found.objects), len(found.boxes)) == (0, 0)
+    assert found.objects.ellipsoids.shape == (0, 9)
+
+
+@pytest.mark.parametrize("name", ["trajectory.txt", "odometry.txt", "map.json", "camera.json"])
+def test_missing_files_are_named(tmp_path, name):
+    save_all(tmp_path)
+    (tmp_path / name).unlink()
+    with pytest.raises(FileError, match=f"{name}: no such file"):
+        load_results(tmp_path)
+    with pytest.raises(FileError, match="elsewhere: no such directory"):
+        load_results(tmp_path / "elsewhere")
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new", "message"),
+    [
+        ("boxes.csv", "inlier,", "fits,", "boxes.csv:1: no column inlier"),
+        ("boxes.csv", "0.25,10.", "0.26,10.", "boxes.csv:2: timestamp 0.26 is of no pose"),
+        ("boxes.csv", ",30.0000,", ",10.0000,", "boxes.csv:2: empty box: x1 < x2, y1 < y2"),
+        ("boxes.csv", "x1 y2", "x1 y3", "boxes.csv:5: truncated names 'y3', not one of x1 y1"),
+        ("boxes.csv", ",3,1,0", ",3,2,0", "boxes.csv:2: inlier is 2, not 0 or 1"),
+        ("boxes.csv", ",3,1,0", ",3,1", "boxes.csv:2: 11 fields, but 12 columns"),
+        ("odometry.txt", "0.25 ", "0.5 ", "odometry.txt: its times are not those of"),
+        ("map.json", '"objects"', '"things"', "map.json: has no list of objects"),
+        ("map.json", '"center"', '"centre"', "map.json: objects row 0: missing center"),
+        ("map.json", '"id": 8', '"id": 3', "map.json: id 3 occurs twice"),
+        ("map.json", "      0.4,", "      -0.4,", "map.json: objects row 0: semi_axes and"),
+        ("map.json", "      -2.0,", "      null,", "map.json: objects center row 0: not finite"),
+        ("map.json", "{", "{{", "map.json:1: not JSON"),
+    ],
+)
+def test_what_is_wrong_is_named(tmp_path, name, old, new, message):
+    save_all(tmp_path)
+    text = (tmp_path / name).read_text()
+    assert old in text
+    (tmp_path / name).write_text(text.replace(old, new, 1))
+    with pytest.raises(FileError, match=message):
+        load_results(tmp_path)

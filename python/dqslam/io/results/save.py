@@ -1,0 +1,109 @@
+"""Write an estimate into a directory."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from dqslam import _core
+from dqslam._checks import Bools, Floats
+from dqslam.estimate import Estimate
+from dqslam.io.files import write_json
+from dqslam.io.results.boxes import write_boxes
+from dqslam.io.trajectory import write_trajectory
+from dqslam.recording import Detections
+
+
+class ObjectCovariances(Protocol):
+    """What ``uncertainty.Marginals`` has of the mapped objects."""
+
+    @property
+    def objects(self) -> Floats:
+        """Covariance of centre [m] and log-Cholesky shape, shape (o, 9, 9); NaN for none."""
+
+
+def save_estimate(
+    estimate: Estimate,
+    directory: str | Path,
+    *,
+    detections: Detections | None = None,
+    held_out: Bools | None = None,
+    marginals: ObjectCovariances | None = None,
+) -> None:
+    """Write an estimate into a directory, which is made if need be.
+
+    ``trajectory.txt`` has the estimated and ``odometry.txt`` the initial poses, world_from_camera;
+    ``map.json`` has the objects, and why others were dropped; ``camera.json`` the camera. Each file
+    is complete or absent.
+
+    Parameters
+    ----------
+    detections
+        Boxes for ``boxes.csv``, edges on the border flagged: those that the estimator used, in the
+        order of ``estimate.inliers``, and any others between them, held out or of object -1.
+    held_out
+        Which of them were kept from the estimator, shape (m,); none by default.
+    marginals
+        Covariances of the mapped objects, for the ellipsoid model.
+    """
+    directory = Path(directory)
+    paths = {"trajectory.txt": estimate.poses, "odometry.txt": estimate.initial_poses}
+    for name, poses in paths.items():
+        cameras = _core.world_from_camera(estimate.pose_model, estimate.camera, poses)
+        write_trajectory(directory / name, estimate.timestamps, cameras)
+    write_json(directory / "camera.json", _camera(estimate.camera))
+    objects = [_object(estimate, row, marginals) for row in range(len(estimate.object_ids))]
+    dropped = [{"id": number, "reason": reason} for number, reason in estimate.dropped.items()]
+    write_json(directory / "map.json", {"objects": objects, "dropped": dropped})
+    if detections is not None:
+        write_boxes(directory / "boxes.csv", estimate, detections, held_out)
+    else:
+        (directory / "boxes.csv").unlink(missing_ok=True)  # those of an estimate before this one
+
+
+def _camera(camera: _core.Camera) -> dict[str, Any]:
+    names = ("fx", "fy", "cx", "cy", "width", "height")
+    lens = zip(("k1", "k2", "p1", "p2", "k3"), camera.distortion.tolist(), strict=True)
+    return {name: getattr(camera, name) for name in names} | dict(lens)
+
+
+def _object(estimate: Estimate, row: int, marginals: ObjectCovariances | None) -> dict[str, Any]:
+    """Describe one object; a dual quadric that is no ellipsoid has a centre, but null axes."""
+    semi_axes, orientation = None, None
+    if estimate.is_ellipsoid[row]:
+        _, semi_axes, orientation = _core.axes_from_ellipsoid(estimate.ellipsoids[row])
+    described = {
+        "id": int(estimate.object_ids[row]),
+        "class_name": estimate.class_names[row],
+        "center": estimate.centers[row],
+        "semi_axes": semi_axes,
+        "orientation_xyzw": orientation,
+        "dual_quadric": _core.dual_quadric_matrix(estimate.dual_quadrics[row]),
+        "observations": int(estimate.observations[row]),
+    }
+    covariance = None if marginals is None else marginals.objects[row]
+    if covariance is None or semi_axes is None or not np.isfinite(covariance).all():
+        return described
+    variance = np.diagonal(_in_log_semi_axes(estimate.ellipsoids[row], covariance[3:, 3:]))
+    return described | {
+        "center_covariance": covariance[:3, :3],
+        "log_semi_axes_sigma": np.sqrt(variance),
+    }
+
+
+def _in_log_semi_axes(ellipsoid: Floats, covariance: Floats) -> Floats:
+    """Return the covariance of the logarithms of the semi-axes, descending, shape (3, 3).
+
+    From that of the log-Cholesky shape, (6, 6). With S = L L^T, S v = a^2 v and |v| = 1,
+    d log a = v^T dS v / (2 a^2) = (v^T dL L^T v) / a^2.
+    """
+    lower = np.diag(np.exp(ellipsoid[3:6]))
+    lower[[1, 2, 2], [0, 0, 1]] = ellipsoid[6:]
+    squares, axes = np.linalg.eigh(lower @ lower.T)
+    squares, axes = squares[::-1], axes[:, ::-1]
+    rows, columns = [0, 1, 2, 1, 2, 2], [0, 1, 2, 0, 0, 1]
+    scale = np.append(np.diag(lower), np.ones(3))  # dL of a logarithm is the entry itself
+    jacobian = (axes[rows] * (lower.T @ axes)[columns]).T * scale / squares[:, None]
+    return np.asarray(jacobian @ covariance @ jacobian.T)
