@@ -1,0 +1,172 @@
+"""Read back what ``save_estimate`` wrote."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dqslam import _core
+from dqslam._checks import Bools, Floats, Ints, as_floats, as_ints
+from dqslam.io.camera import read_camera
+from dqslam.io.files import FileError, read_text
+from dqslam.io.results.boxes import BoxTable, read_boxes
+from dqslam.io.trajectory import read_trajectory
+
+
+@dataclass(frozen=True, eq=False)
+class MapObjects:
+    """The objects of ``map.json``, rows in its order."""
+
+    id: Ints
+    """Shape (o,)."""
+    class_name: tuple[str, ...]
+    """One per object."""
+    center: Floats
+    """In the world, metres, shape (o, 3)."""
+    semi_axes: Floats
+    """Descending, metres, shape (o, 3); NaN where the object is no ellipsoid."""
+    orientation_xyzw: Floats
+    """world_from_object, shape (o, 4); NaN where it is no ellipsoid."""
+    observations: Ints
+    """Boxes that were used, shape (o,)."""
+    center_covariance: Floats
+    """Square metres, shape (o, 3, 3); NaN where unknown."""
+    log_semi_axes_sigma: Floats
+    """Of the natural logarithms of the semi-axes, shape (o, 3); NaN where unknown."""
+    dropped: Mapping[int, str] = field(default_factory=dict)
+    """Ids of objects that were not mapped, and why."""
+
+    def __len__(self) -> int:
+        """Return the number of objects."""
+        return len(self.id)
+
+    @property
+    def is_ellipsoid(self) -> Bools:
+        """Whether each object is a real ellipsoid, shape (o,)."""
+        return np.asarray(np.isfinite(self.semi_axes).all(axis=1))
+
+    @property
+    def ellipsoids(self) -> Floats:
+        """Centre and log-Cholesky shape, shape (o, 9); NaN where it is no ellipsoid."""
+        rows = np.full((len(self), 9), np.nan)
+        for row in np.flatnonzero(self.is_ellipsoid):
+            axes, turn = self.semi_axes[row], self.orientation_xyzw[row]
+            rows[row] = _core.ellipsoid_from_axes(self.center[row], axes, turn)
+        return rows
+
+
+@dataclass(frozen=True, eq=False)
+class Results:
+    """All files of an estimate."""
+
+    directory: Path
+    camera: _core.Camera
+    """Without the mount on the robot: the poses are the camera's."""
+    timestamps: Floats
+    """Seconds, shape (n,)."""
+    world_from_camera: Floats
+    """Estimated, shape (n, 7)."""
+    odometry: Floats
+    """world_from_camera that the estimate started from, shape (n, 7)."""
+    objects: MapObjects
+    boxes: BoxTable | None
+    """None without ``boxes.csv``."""
+    report: Mapping[str, Any]
+    """``report.json``, empty without it."""
+
+
+def load_results(directory: str | Path) -> Results:
+    """Read a directory of results; FileError names what is missing or wrong, and its line.
+
+    ``boxes.csv`` and ``report.json`` may be absent.
+    """
+    directory = Path(directory)
+    if not directory.is_dir():
+        raise FileError(directory, "no such directory")
+    times, poses = read_trajectory(directory / "trajectory.txt")
+    odometry_times, odometry = read_trajectory(directory / "odometry.txt")
+    if not np.array_equal(times, odometry_times):
+        message = f"its times are not those of {directory / 'trajectory.txt'}"
+        raise FileError(directory / "odometry.txt", message)
+    boxes, report = directory / "boxes.csv", directory / "report.json"
+    return Results(
+        directory=directory,
+        camera=read_camera(directory / "camera.json"),
+        timestamps=times,
+        world_from_camera=poses,
+        odometry=odometry,
+        objects=_read_map(directory / "map.json"),
+        boxes=read_boxes(boxes, times) if boxes.exists() else None,
+        report=_read_json(report) if report.exists() else {},
+    )
+
+
+def _read_json(path: Path) -> dict[str, Any]:
+    try:
+        content = json.loads(read_text(path))
+    except json.JSONDecodeError as error:
+        raise FileError(path, f"not JSON: {error.msg}", error.lineno) from None
+    except RecursionError:
+        raise FileError(path, "nested too deeply") from None
+    if not isinstance(content, dict):
+        raise FileError(path, "holds no table of named values")
+    return content
+
+
+def _read_map(path: Path) -> MapObjects:
+    content = _read_json(path)
+    objects = content.get("objects")
+    if not isinstance(objects, list) or not all(isinstance(entry, dict) for entry in objects):
+        raise FileError(path, "has no list of objects")
+    required = ("id", "class_name", "center", "semi_axes", "orientation_xyzw", "observations")
+    for row, entry in enumerate(objects):
+        missing = [name for name in required if name not in entry]
+        if missing:
+            raise FileError(path, f"objects row {row}: missing {', '.join(missing)}")
+    try:
+        found = MapObjects(
+            id=as_ints("objects id", _column(objects, "id")),
+            class_name=tuple(str(entry["class_name"]) for entry in objects),
+            center=as_floats("objects center", _column(objects, "center"), [None, 3]),
+            semi_axes=_maybe(objects, "semi_axes", (3,)),
+            orientation_xyzw=_maybe(objects, "orientation_xyzw", (4,)),
+            observations=as_ints("objects observations", _column(objects, "observations")),
+            center_covariance=_maybe(objects, "center_covariance", (3, 3)),
+            log_semi_axes_sigma=_maybe(objects, "log_semi_axes_sigma", (3,)),
+            dropped={int(one["id"]): str(one["reason"]) for one in content.get("dropped", [])},
+        )
+    except (ValueError, TypeError, KeyError) as error:
+        raise FileError(path, str(error)) from None
+    _check(path, found)
+    return found
+
+
+def _check(path: Path, found: MapObjects) -> None:
+    ids, counts = np.unique(found.id, return_counts=True)
+    if (counts > 1).any():
+        raise FileError(path, f"id {ids[counts > 1][0]} occurs twice")
+    norm = np.linalg.norm(found.orientation_xyzw, axis=1)
+    wrong = (found.semi_axes <= 0.0).any(axis=1) | (np.abs(norm - 1.0) > 1e-6)
+    wrong |= np.isfinite(norm) != found.is_ellipsoid
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        message = f"objects row {row}: semi_axes and orientation_xyzw are of no ellipsoid"
+        raise FileError(path, message)
+
+
+def _column(objects: list[dict[str, Any]], name: str) -> list[Any]:
+    return [entry[name] for entry in objects]
+
+
+def _maybe(objects: list[dict[str, Any]], name: str, shape: tuple[int, ...]) -> Floats:
+    """Return a table of finite entries, and NaN where one is absent or null; (o, *shape)."""
+    table = np.full((len(objects), *shape), np.nan)
+    for row, entry in enumerate(objects):
+        if entry.get(name) is not None:
+            table[row] = as_floats(f"objects row {row} {name}", entry[name], shape)
+    return table
