@@ -16,20 +16,45 @@ from pathlib import Path
 from typing import Any
 
 from dqslam import _core
-from dqslam.io.files import FileError, read_text
+from dqslam.io.camera.build import DISTORTION, INTRINSICS, make_camera
+from dqslam.io.files import FileError, read_text, write_json, write_text
+from dqslam.io.formats import Format
 
-INTRINSICS = ("fx", "fy", "cx", "cy", "width", "height")
-DISTORTION = ("k1", "k2", "p1", "p2", "k3")
 DISTORTION_LISTS = ("distortion", "dist_k1k2p1p2k3")
-LARGEST_IMAGE = 1_000_000
 # Reading these as pinhole with radial and tangential distortion would be wrong without a sign.
 OTHER_MODELS = ("fisheye", "equidistant", "kannala", "omni", "double_sphere", "rational", "fov")
 
 
-def read_camera(path: str | Path) -> _core.Camera:
-    """Read a pinhole camera with its lens distortion; TOML if the name ends so, else JSON."""
+def read_json(path: str | Path) -> _core.Camera:
+    """Read a camera from JSON."""
+    return _read(path, toml=False)
+
+
+def read_toml(path: str | Path) -> _core.Camera:
+    """Read a camera from TOML."""
+    return _read(path, toml=True)
+
+
+def write_json_camera(path: str | Path, camera: _core.Camera) -> None:
+    """Write a camera as JSON that comes back to the last bit."""
+    write_json(path, _values(camera))
+
+
+def write_toml(path: str | Path, camera: _core.Camera) -> None:
+    """Write a camera as TOML that comes back to the last bit."""
+    write_text(path, "".join(f"{key} = {value!r}\n" for key, value in _values(camera).items()))
+
+
+def _values(camera: _core.Camera) -> dict[str, float]:
+    values = {key: getattr(camera, key) for key in INTRINSICS}
+    if camera.has_distortion:
+        values |= dict(zip(DISTORTION, camera.distortion.tolist(), strict=True))
+    return values
+
+
+def _read(path: str | Path, *, toml: bool) -> _core.Camera:
     text = read_text(path)
-    table = _parse(path, text)
+    table = _parse(path, text, toml=toml)
     missing = [key for key in INTRINSICS if key not in table]
     if missing:
         raise FileError(path, f"missing {', '.join(missing)} (it has: {', '.join(table)})")
@@ -38,30 +63,13 @@ def read_camera(path: str | Path) -> _core.Camera:
         message = f"model is {model}; only pinhole with k1 k2 p1 p2 k3 is known"
         raise FileError(path, message, _line_of(text, "model"))
     values = {key: _number(path, text, key, table[key]) for key in INTRINSICS}
-    for key in ("fx", "fy", "width", "height"):
-        if values[key] <= 0:
-            raise FileError(path, f"{key} is {values[key]:g}, not positive", _line_of(text, key))
-    for key in ("width", "height"):
-        if values[key] != math.floor(values[key]) or values[key] > LARGEST_IMAGE:
-            message = f"{key} is {values[key]:g}, not a whole number of pixels up to 1e6"
-            raise FileError(path, message, _line_of(text, key))
-    return _core.Camera(
-        values["fx"],
-        values["fy"],
-        values["cx"],
-        values["cy"],
-        int(values["width"]),
-        int(values["height"]),
-        distortion=_distortion(path, text, table),
-    )
+    distortion = _distortion(path, text, table)
+    return make_camera(path, values, distortion, lambda key: _line_of(text, key))
 
 
-def _parse(path: str | Path, text: str) -> dict[str, Any]:
+def _parse(path: str | Path, text: str, *, toml: bool) -> dict[str, Any]:
     try:
-        if Path(path).suffix.lower() == ".toml":
-            table: Any = tomllib.loads(text)
-        else:
-            table = json.loads(text)
+        table: Any = tomllib.loads(text) if toml else json.loads(text)
     except json.JSONDecodeError as error:
         raise FileError(path, f"not JSON: {error.msg}", error.lineno) from None
     except tomllib.TOMLDecodeError as error:
@@ -109,3 +117,15 @@ def _line_of(text: str, key: str) -> int | None:
         if re.search(rf"(?<![\w-])[\"']?{re.escape(key)}[\"']?\s*(?:[:=\]])", line):
             return number
     return None
+
+
+JSON = Format(
+    "json",
+    "its name ends in .json",
+    lambda look: look.suffix == ".json",
+    read_json,
+    write_json_camera,
+)
+TOML = Format(
+    "toml", "its name ends in .toml", lambda look: look.suffix == ".toml", read_toml, write_toml
+)

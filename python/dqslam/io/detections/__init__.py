@@ -1,0 +1,68 @@
+"""Detections from files, one module a format; all become corners in pixels, see `table`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from dqslam.io.detections.coco import COCO, read_categories
+from dqslam.io.detections.csv import CSV
+from dqslam.io.detections.mot import MOT
+from dqslam.io.detections.rosbag import ARRAYS
+from dqslam.io.detections.table import DetectionTable, checked
+from dqslam.io.detections.yolo import YOLO, read_data_names
+from dqslam.io.files import read_text
+from dqslam.io.formats import choose_format
+from dqslam.io.frames import FrameTimes
+from dqslam.io.rosbag import topic_option
+
+__all__ = ["DETECTION_FORMATS", "DetectionTable", "read_class_names", "read_detections"]
+
+DETECTION_FORMATS = (ARRAYS, YOLO, COCO, MOT, CSV)
+
+
+def read_detections(
+    path: str | Path,
+    format: str | None = None,
+    *,
+    width: int | None = None,
+    height: int | None = None,
+    frames: FrameTimes | None = None,
+    classes: dict[int, str] | None = None,
+    cut: bool = True,
+    topic: str | None = None,
+) -> DetectionTable:
+    """Read boxes, checked.
+
+    Parameters
+    ----------
+    path
+        A file, a folder of YOLO files, or the folder of a bag.
+    format
+        One of DETECTION_FORMATS; by default it is told by the look of the file.
+    width, height
+        Size of the image in px, for YOLO and for `cut`.
+    frames
+        Times of the frames, for a format that has none; they go before the file's own.
+    classes
+        Names of classes by id; they go before the file's own.
+    cut
+        Parts of boxes outside of the image are cut off, and a box that is wholly outside is
+        refused.
+    topic
+        Of a bag with several.
+    """
+    chosen = choose_format(path, format, DETECTION_FORMATS, "detections")
+    options = topic_option(chosen.name, topic)
+    table = chosen.read(path, width=width, height=height, frames=frames, classes=classes, **options)
+    return checked(table, width=width, height=height, cut=cut)
+
+
+def read_class_names(path: str | Path) -> dict[int, str]:
+    """Read names by class id: COCO's categories, a data.yaml, or a text of one name a line."""
+    suffix = Path(path).suffix.lower()
+    if suffix == ".json":
+        return read_categories(path)
+    if suffix in (".yaml", ".yml"):
+        return read_data_names(path)
+    lines = read_text(path).rstrip("\n").split("\n")
+    return {number: line.strip() for number, line in enumerate(lines) if line.strip()}

@@ -1,0 +1,91 @@
+"""What a file format is, and how the format of a file is told: by name, else by its look."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Generic, TypeVar
+
+from dqslam.io.files import FileError, read_rows
+
+Content = TypeVar("Content")
+HEAD_LINES = 200
+
+
+@dataclass(frozen=True)
+class Look:
+    """What a format is recognised by: the path, and the first line that is no comment."""
+
+    path: Path
+    first: str  #: "" where the path is a folder, or no text
+
+    @property
+    def suffix(self) -> str:
+        """Return the ending of the name in lower case, with its dot."""
+        return self.path.suffix.lower()
+
+
+@dataclass(frozen=True)
+class Format(Generic[Content]):
+    """One file format of cameras, trajectories or detections."""
+
+    name: str
+    looks: str  #: what it is recognised by, in words
+    recognise: Callable[[Look], bool]
+    read: Callable[..., Content]
+    write: Callable[..., None] | None = None
+    counts_frames: bool = False  #: it has no times, only numbers of frames
+    loses: tuple[str, ...] = ()  #: what it has no place for
+
+
+def choose_format(
+    path: str | Path, name: str | None, formats: Sequence[Format[Content]], kind: str
+) -> Format[Content]:
+    """Find the format of that name, or the first whose look the file has.
+
+    Raises
+    ------
+    ValueError
+        The name is not one of the formats'.
+    FileError
+        There is no such file, or it looks like none of them.
+    """
+    if name is not None:
+        return named_format(name, formats, kind)
+    look = _look(path)
+    for format_ in formats:
+        if format_.recognise(look):
+            return format_
+    if look.path.is_dir():
+        raise FileError(path, "cannot be read: Is a directory")
+    if look.first == "":
+        read_rows(path)  # names what is wrong: empty, comments only, or no text
+    tried = "; ".join(f"{format_.name}: {format_.looks}" for format_ in formats)
+    raise FileError(path, f"{kind} in no known format ({tried}); name it with --format")
+
+
+def named_format(name: str, formats: Sequence[Format[Content]], kind: str) -> Format[Content]:
+    """Find the format of that name."""
+    for format_ in formats:
+        if format_.name == name:
+            return format_
+    known = ", ".join(format_.name for format_ in formats)
+    raise ValueError(f"format {name!r} is none of {kind} formats: {known}")
+
+
+def _look(path: str | Path) -> Look:
+    path = Path(path)
+    if not path.exists():
+        raise FileError(path, "no such file")
+    first = ""
+    if path.is_file():
+        try:
+            with path.open(encoding="utf-8-sig") as file:
+                head = list(itertools.islice(file, HEAD_LINES))
+        except (OSError, UnicodeDecodeError):
+            head = []
+        rows = [line.strip() for line in head if not line.lstrip().startswith("#")]
+        first = next((row for row in rows if row), "")
+    return Look(path, first)

@@ -1,0 +1,137 @@
+"""When a frame was taken, for formats that number frames and have no times.
+
+Frames count from 0. A file of times is one of
+
+- a KITTI ``times.txt``: one number a line, line i for frame i;
+- a TUM ``rgb.txt``: ``time filename`` a line, line i for frame i; a box may name the image instead;
+- CSV with the columns ``frame`` and ``timestamp``, any others beside.
+
+Times are seconds and increase with the frame.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dqslam.io.files import FileError, parse_integers, parse_numbers, read_rows, write_text
+
+COLUMNS = ("frame", "timestamp")
+
+
+@dataclass(frozen=True, eq=False)
+class FrameTimes:
+    """Times of frames: a table of them, or a rate."""
+
+    source: str
+    table: dict[int, float] | None = None  #: seconds of a frame
+    rate: float = 1.0  #: frames a second, where there is no table
+    names: dict[str, int] = field(
+        default_factory=dict
+    )  #: frame of an image, by name without ending
+
+    def at(
+        self, path: str | Path, frames: NDArray[np.int64], lines: Sequence[int]
+    ) -> NDArray[np.float64]:
+        """Return the times (n,) s of ``frames`` (n,) that stand in these lines of a file."""
+        if self.table is None:
+            return frames / self.rate
+        for frame, line in zip(frames.tolist(), lines, strict=True):
+            if frame not in self.table:
+                raise FileError(path, f"{self.source} has no time for frame {frame}", line)
+        return np.array([self.table[frame] for frame in frames.tolist()], dtype=float)
+
+
+#: Time is the number of the frame: for a trajectory and boxes that both count frames.
+BY_NUMBER = FrameTimes("the number of the frame")
+
+
+def frame_rate(rate: float) -> FrameTimes:
+    """Return the times of frames that come at ``rate`` Hz, frame 0 at 0 s."""
+    if not (math.isfinite(rate) and rate > 0):
+        raise ValueError(f"frame rate is {rate:g} Hz, not positive")
+    return FrameTimes(f"a rate of {rate:g} Hz", rate=rate)
+
+
+def read_frame_times(path: str | Path) -> FrameTimes:
+    """Read a file of times; see the head of this module for its forms."""
+    rows, lines = read_rows(path)
+    names: dict[str, int] = {}
+    if "," in rows[0]:
+        frames, cells, lines = _columns(path, rows, lines)
+    else:
+        frames = np.arange(len(rows))
+        fields = [row.split() for row in rows]
+        for row, line in zip(fields, lines, strict=True):
+            if len(row) not in (1, 2) or len(row) != len(fields[0]):
+                raise FileError(path, f"{len(row)} fields, not time, or time and filename", line)
+        cells = [row[0] for row in fields]
+        if len(fields[0]) == 2:
+            names = {image_name(row[1]): i for i, row in enumerate(fields)}
+    times = parse_numbers(path, "timestamp", cells, lines)
+    late = np.flatnonzero((np.diff(times) <= 0) | (np.diff(frames) <= 0))
+    if late.size:
+        i = int(late[0])
+        message = (
+            f"frame {frames[i + 1]} at {times[i + 1].item()!r} s is not later than "
+            f"frame {frames[i]} at {times[i].item()!r} s (line {lines[i]})"
+        )
+        raise FileError(path, message, lines[i + 1])
+    table = dict(zip(frames.tolist(), times.tolist(), strict=True))
+    return FrameTimes(str(path), table, names=names)
+
+
+def write_frame_times(path: str | Path, frames: ArrayLike, times: ArrayLike) -> None:
+    """Write the times (n,) s of frames (n,) as CSV that read_frame_times takes; repeats are one."""
+    write_text(path, frame_table(frames, times))
+
+
+def frame_table(frames: ArrayLike, times: ArrayLike) -> list[str]:
+    """Return the lines of that CSV."""
+    pairs = zip(np.asarray(frames).tolist(), np.asarray(times, dtype=float).tolist(), strict=True)
+    rows = [f"{frame},{time!r}\n" for frame, time in sorted(set(pairs))]
+    return [",".join(COLUMNS) + "\n", *rows]
+
+
+def image_name(name: str) -> str:
+    """Return the name of an image without folder and ending: rgb/13.25.png is 13.25."""
+    last = name.replace("\\", "/").rsplit("/", 1)[-1]
+    stem, dot, ending = last.rpartition(".")
+    return stem if dot and ending.isalpha() else last
+
+
+def frame_of(name: str, frames: FrameTimes | None) -> int | None:
+    """Return the frame of an image: its place in the times, else the number that is its name.
+
+    The number may follow a prefix: ``000042``, ``left_42``, ``frame-000042``. None where there is
+    neither.
+    """
+    name = image_name(name)
+    if frames is not None and frames.names:
+        return frames.names.get(name)
+    digits = name.replace("-", "_").rpartition("_")[2]
+    return int(digits) if digits.isascii() and digits.isdigit() and len(digits) < 16 else None
+
+
+def _columns(
+    path: str | Path, rows: Sequence[str], lines: Sequence[int]
+) -> tuple[NDArray[np.int64], list[str], list[int]]:
+    header, *records = csv.reader(rows)
+    header = [name.strip() for name in header]
+    missing = [name for name in COLUMNS if name not in header]
+    if missing:
+        message = f"no column {', '.join(missing)} (it has: {', '.join(header)})"
+        raise FileError(path, message, lines[0])
+    if not records:
+        raise FileError(path, "holds no times, only a header")
+    for record, line in zip(records, lines[1:], strict=True):
+        if len(record) != len(header):
+            raise FileError(path, f"{len(record)} fields, but {len(header)} columns", line)
+    frame, time = ([record[header.index(name)] for record in records] for name in COLUMNS)
+    return parse_integers(path, "frame", frame, lines[1:]), time, list(lines[1:])

@@ -1,0 +1,116 @@
+"""ROS bags (ROS 1 .bag, rosbag2 folders of sqlite3 or mcap, .mcap and .db3 files), without ROS.
+
+Needs the package `rosbags`: pip install 'dqslam[rosbag]'. Message types that a bag does not
+describe itself are those of ROS 2 Humble and of vision_msgs 4.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from dqslam.io.files import FileError
+from dqslam.io.formats import Look
+
+NAME = "rosbag"
+LOOKS = "a .bag, .mcap or .db3 file, or a folder with metadata.yaml"
+ENDINGS = (".bag", ".mcap", ".db3")
+
+# vision_msgs 4: older bags of sqlite3 have no description of their messages.
+VISION_MSGS = {
+    "vision_msgs/msg/Point2D": "float64 x\nfloat64 y\n",
+    "vision_msgs/msg/Pose2D": "vision_msgs/Point2D position\nfloat64 theta\n",
+    "vision_msgs/msg/BoundingBox2D": (
+        "vision_msgs/Pose2D center\nfloat64 size_x\nfloat64 size_y\n"
+    ),
+    "vision_msgs/msg/ObjectHypothesis": "string class_id\nfloat64 score\n",
+    "vision_msgs/msg/ObjectHypothesisWithPose": (
+        "vision_msgs/ObjectHypothesis hypothesis\ngeometry_msgs/PoseWithCovariance pose\n"
+    ),
+    "vision_msgs/msg/Detection2D": (
+        "std_msgs/Header header\nvision_msgs/ObjectHypothesisWithPose[] results\n"
+        "vision_msgs/BoundingBox2D bbox\nstring id\n"
+    ),
+    "vision_msgs/msg/Detection2DArray": (
+        "std_msgs/Header header\nvision_msgs/Detection2D[] detections\n"
+    ),
+}
+
+
+def looks_like_bag(look: Look) -> bool:
+    """Tell by the ending, or by the description that a rosbag2 folder has."""
+    return look.suffix in ENDINGS or (look.path / "metadata.yaml").is_file()
+
+
+def messages(path: str | Path, kind: str, topic: str | None) -> Iterator[tuple[str, Any]]:
+    """Give the messages of one kind (``nav_msgs/msg/Odometry``) and where each stands, in order.
+
+    Raises
+    ------
+    FileError
+        The bag cannot be read, or it does not tell which topic is meant.
+    RuntimeError
+        The package `rosbags` is missing.
+    """
+    try:
+        from rosbags.highlevel import AnyReader, AnyReaderError
+    except ImportError:
+        raise RuntimeError(
+            f"{path}: bags are read with rosbags, which is missing: pip install 'dqslam[rosbag]'"
+        ) from None
+    if not Path(path).exists():
+        raise FileError(path, "no such file")
+    try:
+        with AnyReader([Path(path)], default_typestore=_typestore()) as bag:
+            name = _topic(path, [(c.topic, c.msgtype) for c in bag.connections], kind, topic)
+            connections = [c for c in bag.connections if c.topic == name]
+            for number, (connection, _, data) in enumerate(bag.messages(connections), start=1):
+                where = f"{name}, message {number}"
+                yield where, bag.deserialize(data, connection.msgtype)
+    except FileError:
+        raise
+    except AnyReaderError as error:
+        raise FileError(path, f"is no bag that can be read: {error}") from None
+
+
+def topic_option(format_name: str, topic: str | None) -> dict[str, str]:
+    """Return the argument that tells the reader of a bag its topic; nothing without a topic."""
+    if topic is None:
+        return {}
+    if format_name != NAME:
+        raise ValueError(f"topic {topic}: only bags have topics, not {format_name}")
+    return {"topic": topic}
+
+
+def stamp_seconds(message: Any) -> float:
+    """Return the time of a message's header in seconds."""
+    stamp = message.header.stamp
+    nanoseconds: int = stamp.sec * 10**9 + stamp.nanosec
+    return nanoseconds / 10**9
+
+
+def _typestore() -> Any:
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    for name, text in VISION_MSGS.items():
+        store.register(get_types_from_msg(text, name))
+    return store
+
+
+def _topic(path: str | Path, topics: list[tuple[str, str]], kind: str, wanted: str | None) -> str:
+    of_kind = sorted({name for name, message in topics if message == kind})
+    if wanted is not None:
+        if wanted in of_kind:
+            return wanted
+        raise FileError(path, f"no topic {wanted} of {kind} (it has: {_listed(topics)})")
+    if not of_kind:
+        raise FileError(path, f"no topic of {kind} (it has: {_listed(topics)})")
+    if len(of_kind) > 1:
+        raise FileError(path, f"{kind} has topics {', '.join(of_kind)}: name one with --topic")
+    return of_kind[0]
+
+
+def _listed(topics: list[tuple[str, str]]) -> str:
+    return ", ".join(sorted({f"{name} ({message})" for name, message in topics})) or "nothing"

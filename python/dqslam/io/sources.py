@@ -1,0 +1,81 @@
+"""What belongs together when several files are read: names of formats, and times of frames."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from dqslam.io.camera import CAMERA_FORMATS
+from dqslam.io.detections import DETECTION_FORMATS
+from dqslam.io.formats import choose_format
+from dqslam.io.frames import BY_NUMBER, FrameTimes, frame_rate, read_frame_times
+from dqslam.io.trajectory import TRAJECTORY_FORMATS
+
+
+class FormatNames(NamedTuple):
+    """The format of each file, None where the look of the file tells."""
+
+    camera: str | None = None
+    trajectory: str | None = None
+    detections: str | None = None
+
+
+BY_LOOK = FormatNames()
+KINDS = dict(
+    zip(
+        FormatNames._fields,
+        (
+            [format_.name for format_ in formats]
+            for formats in (CAMERA_FORMATS, TRAJECTORY_FORMATS, DETECTION_FORMATS)
+        ),
+        strict=True,
+    )
+)
+
+
+def split_formats(names: Sequence[str]) -> FormatNames:
+    """Sort names of formats by what they are of; each name says it, ``rosbag`` is all three.
+
+    Raises
+    ------
+    ValueError
+        A name is unknown, or two are of the same kind.
+    """
+    chosen: dict[str, str] = {}
+    # The bag fills what no other name has claimed.
+    for name in sorted(names, key=lambda name: sum(name in known for known in KINDS.values())):
+        kinds = [kind for kind, known in KINDS.items() if name in known]
+        if not kinds:
+            known = dict.fromkeys(name for names in KINDS.values() for name in names)
+            raise ValueError(f"format {name!r} is none of {', '.join(known)}")
+        free = [kind for kind in kinds if kind not in chosen]
+        if not free:
+            raise ValueError(f"formats {chosen[kinds[0]]} and {name} are both of {kinds[0]}")
+        chosen |= dict.fromkeys(free, name)
+    return FormatNames(**chosen)
+
+
+def choose_frame_times(
+    odometry: str | Path,
+    detections: str | Path,
+    formats: FormatNames = BY_LOOK,
+    *,
+    times: str | Path | None = None,
+    rate: float | None = None,
+) -> FrameTimes | None:
+    """Tell the times of frames for the readers of a trajectory and of boxes.
+
+    They are those of the file ``times``, or of ``rate`` Hz. Else, where the trajectory counts
+    frames, the frame's number is its time for both. Else None: the files have times of their own,
+    or their readers say that they need them.
+    """
+    if times is not None and rate is not None:
+        raise ValueError("--frame-times and --frame-rate both say when a frame was taken")
+    if times is not None:
+        return read_frame_times(times)
+    if rate is not None:
+        return frame_rate(rate)
+    path = choose_format(odometry, formats.trajectory, TRAJECTORY_FORMATS, "trajectory")
+    boxes = choose_format(detections, formats.detections, DETECTION_FORMATS, "detections")
+    return BY_NUMBER if path.counts_frames and boxes.name != "rosbag" else None

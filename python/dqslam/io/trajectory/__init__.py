@@ -1,0 +1,60 @@
+"""Trajectories from files, one module a format; all become world_from_camera at times in s."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dqslam import _core
+from dqslam.io.formats import choose_format
+from dqslam.io.frames import FrameTimes
+from dqslam.io.rosbag import topic_option
+from dqslam.io.trajectory.euroc import EUROC
+from dqslam.io.trajectory.kitti import KITTI
+from dqslam.io.trajectory.rosbag import ODOMETRY
+from dqslam.io.trajectory.table import Trajectory as Trajectory
+from dqslam.io.trajectory.tum import TUM
+from dqslam.io.trajectory.tum import write_tum as write_trajectory
+
+__all__ = ["TRAJECTORY_FORMATS", "Trajectory", "read_trajectory", "write_trajectory"]
+
+TRAJECTORY_FORMATS = (ODOMETRY, TUM, KITTI, EUROC)
+
+
+def read_trajectory(
+    path: str | Path,
+    format: str | None = None,
+    *,
+    frames: FrameTimes | None = None,
+    body_from_camera: ArrayLike | None = None,
+    repeated_times: bool = False,
+    topic: str | None = None,
+) -> Trajectory:
+    """Read a trajectory.
+
+    Parameters
+    ----------
+    path
+        A file, or the folder of a bag.
+    format
+        One of TRAJECTORY_FORMATS; by default it is told by the look of the file.
+    frames
+        Times of the frames, for a format that has none.
+    body_from_camera
+        Pose (7,) of the camera in the body, m and x y z w, where the trajectory is the body's.
+    repeated_times
+        A time that comes again is left out instead of refused: motion capture at a high rate,
+        rounded to its last digit, has a few.
+    topic
+        Of a bag with several.
+    """
+    chosen = choose_format(path, format, TRAJECTORY_FORMATS, "trajectory")
+    options = topic_option(chosen.name, topic)
+    trajectory = chosen.read(path, frames=frames, repeated_times=repeated_times, **options)
+    if body_from_camera is None:
+        return trajectory
+    mount = np.tile(np.asarray(body_from_camera, dtype=float), (len(trajectory.timestamps), 1))
+    cameras = _core.compose(_core.PoseModel.SE3, trajectory.world_from_camera, mount)
+    return Trajectory(trajectory.timestamps, cameras)
