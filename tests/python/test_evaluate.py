@@ -5,10 +5,7 @@ from scipy.optimize import least_squares
 import oracle
 from dqslam import Camera, Estimate, PoseModel, _core, evaluate
 from dqslam.evaluate import (
-    absolute_trajectory_error,
-    align_rigid,
     box_volumes,
-    center_errors,
     cube_volumes,
     ellipsoid_volumes,
     position_error,
@@ -105,88 +102,6 @@ def test_position_error_of_se3_has_three_axes():
     true = np.tile([0.0, 0, 0, 0, 0, 0, 1], (2, 1))
     moved = true + [[2.0, 3.0, 6.0, 0, 0, 0, 0], [0.0] * 7]
     assert position_error(PoseModel.SE3, moved, true) == pytest.approx(3.5)
-
-
-@pytest.mark.parametrize("size", [2, 3])
-def test_alignment_undoes_a_rigid_motion(size):
-    points = RANDOM.normal(size=(12, size))
-    turned = oracle.quaternion_matrix([0.6, 0.0, 0.0, 0.8])  # about x
-    turn = turned if size == 3 else turned[1:, 1:]
-    moved = points @ turn.T + np.arange(size)
-    alignment = align_rigid(points, moved)
-    np.testing.assert_allclose(alignment.rotation, turn, atol=1e-12)
-    np.testing.assert_allclose(alignment.translation, np.arange(size), atol=1e-12)
-    np.testing.assert_allclose(alignment.apply(points), moved, atol=1e-12)
-
-
-@pytest.mark.parametrize("size", [2, 3])
-def test_alignment_never_mirrors_nor_scales(size):
-    points = RANDOM.normal(size=(12, size))
-    mirrored = 3.0 * points * np.array([-1.0, 1.0, 1.0])[:size]
-    rotation = align_rigid(points, mirrored).rotation
-    np.testing.assert_allclose(rotation @ rotation.T, np.eye(size), atol=1e-12)
-    assert np.linalg.det(rotation) == pytest.approx(1.0)
-
-
-def test_alignment_is_the_best_of_its_neighbours():
-    points = RANDOM.normal(size=(30, 3))
-    target = points + 0.3 * RANDOM.normal(size=(30, 3))
-    alignment = align_rigid(points, target)
-    least = np.sum((alignment.apply(points) - target) ** 2)
-    for _ in range(50):
-        xyzw = np.append(0.02 * RANDOM.normal(size=3), 1.0)
-        turn = oracle.quaternion_matrix(xyzw / np.linalg.norm(xyzw))
-        shift = 0.02 * RANDOM.normal(size=3)
-        assert np.sum((alignment.apply(points) @ turn.T + shift - target) ** 2) > least
-
-
-def test_alignment_of_a_straight_line_still_fits():
-    line = np.column_stack([np.arange(5.0), np.zeros(5), np.zeros(5)])
-    moved = line[:, [2, 0, 1]] + 1.0
-    np.testing.assert_allclose(align_rigid(line, moved).apply(line), moved, atol=1e-12)
-
-
-TRUE = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
-
-
-def test_trajectory_error_by_hand():
-    error = absolute_trajectory_error(
-        TRUE + [[0, 0, 1], [0, 0, 2], [0, 0, 3], [0, 0, 6]], TRUE, align="none"
-    )
-    assert (error.mean, error.median, error.max) == (3.0, 2.5, 6.0)
-    assert error.rmse == pytest.approx(np.sqrt((1 + 4 + 9 + 36) / 4.0))
-    np.testing.assert_array_equal(error.alignment.rotation, np.eye(3))
-
-
-def test_se2_alignment_keeps_heights():
-    turned = TRUE @ oracle.quaternion_matrix([0, 0, 0.6, 0.8]).T + [5.0, 6.0, 2.0]
-    on_plane = absolute_trajectory_error(turned, TRUE, align="se2")
-    assert on_plane.mean == pytest.approx(2.0)
-    assert absolute_trajectory_error(turned, TRUE, align="se3").max == pytest.approx(0.0, abs=1e-12)
-
-
-def test_object_centres_use_the_trajectorys_alignment():
-    turn = oracle.quaternion_matrix([0, 0, 0.6, 0.8])
-    alignment = absolute_trajectory_error(TRUE @ turn.T + 7.0, TRUE).alignment
-    true_centers = np.array([[3.0, 4.0, 5.0], [0.0, 0.0, 0.0]])
-    centers = (true_centers + [[0.0, 0.0, 0.5], [1.0, 0.0, 0.0]]) @ turn.T + 7.0
-    np.testing.assert_allclose(center_errors(centers, true_centers, alignment), [0.5, 1.0])
-
-
-@pytest.mark.parametrize(
-    ("points", "true_points", "align", "message"),
-    [
-        (TRUE, TRUE[:3], "se3", r"differ in shape: \(4, 3\), \(3, 3\)"),
-        (TRUE[:0], TRUE[:0], "se3", "no points to compare"),
-        (TRUE[:1], TRUE[:1], "se3", "expected two points or more, got 1"),
-        (TRUE[:, :2], TRUE[:, :2], "se3", r"expected shape \(n, 3\), got \(4, 2\)"),
-        (TRUE * np.nan, TRUE, "se3", "estimated points row 0: not finite"),
-        (TRUE, TRUE, "sim3", '"none", "se2" or "se3", got \'sim3\''),
-    ],
-)
-def test_bad_trajectories_are_refused(points, true_points, align, message):
-    with pytest.raises(ValueError, match=message):
-        absolute_trajectory_error(points, true_points, align=align)
 
 
 def test_estimate_reads_centres_and_shapes_from_quadrics():

@@ -1,13 +1,13 @@
-"""Errors of an estimate against the truth, as numbers with units."""
+"""Errors of an estimate against a simulation's truth, object by object id, without alignment."""
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
-from dqslam._checks import Floats, Ints, as_floats
+from dqslam._checks import Floats, Ints
 from dqslam._core import PoseModel
 from dqslam.estimate import Estimate
+from dqslam.evaluate.alignment import same_shape
 from dqslam.recording import Truth
 
 
@@ -74,7 +74,7 @@ def position_error(pose_model: PoseModel, poses: Floats, true_poses: Floats) -> 
 
 def mean_distance(points: Floats, true_points: Floats) -> float:
     """Return the mean distance between rows of two tables of the same shape (n, k)."""
-    points, true_points = _same_shape(points, true_points)
+    points, true_points = same_shape(points, true_points)
     return float(np.linalg.norm(points - true_points, axis=1).mean())
 
 
@@ -104,115 +104,6 @@ def box_volumes(shapes: Floats) -> Floats:
     """
     across = np.sqrt(np.linalg.det(shapes[:, :2, :2]))  # product of the ground's semi-axes
     return np.asarray(8.0 * (np.pi / 4.0) ** 2 * across * np.sqrt(shapes[:, 2, 2]))
-
-
-@dataclass(frozen=True, eq=False)
-class Alignment:
-    """A rigid motion true_from_estimated."""
-
-    rotation: Floats
-    """Shape (k, k)."""
-    translation: Floats
-    """Metres, shape (k,)."""
-
-    def apply(self, points: Floats) -> Floats:
-        """Move points, shape (n, k)."""
-        return np.asarray(points @ self.rotation.T + self.translation)
-
-
-def align_rigid(points: Floats, true_points: Floats) -> Alignment:
-    """Find the rigid motion, without scale, that brings points nearest to the true ones.
-
-    Umeyama's closed form of least squares; both of shape (n, k), k = 2 for SE(2), 3 for SE(3).
-    Where all points lie on a line (k = 3), the turn about that line is arbitrary.
-    """
-    points, true_points = _same_shape(points, true_points)
-    count, size = points.shape
-    if count < 2:
-        raise ValueError(f"alignment: expected two points or more, got {count}")
-    middle, true_middle = points.mean(axis=0), true_points.mean(axis=0)
-    u, _, vt = np.linalg.svd((true_points - true_middle).T @ (points - middle))
-    no_mirror = np.ones(size)
-    no_mirror[-1] = np.sign(np.linalg.det(u) * np.linalg.det(vt))
-    rotation = (u * no_mirror) @ vt
-    return Alignment(rotation, true_middle - rotation @ middle)
-
-
-@dataclass(frozen=True, eq=False)
-class TrajectoryError:
-    """Distances between two trajectories after alignment, metres."""
-
-    mean: float
-    rmse: float
-    """Root of the mean square: what most tools call the absolute trajectory error."""
-    median: float
-    max: float
-    alignment: Alignment
-    """true_from_estimated, in three dimensions whatever the kind of alignment."""
-
-    def __str__(self) -> str:
-        """Show all on one line."""
-        return (
-            f"mean {self.mean:.4f} m, rmse {self.rmse:.4f} m, "
-            f"median {self.median:.4f} m, max {self.max:.4f} m"
-        )
-
-
-def absolute_trajectory_error(
-    positions: Floats,
-    true_positions: Floats,
-    *,
-    align: Literal["none", "se2", "se3"] = "se3",
-) -> TrajectoryError:
-    """Compare positions with true ones, shape (n, 3) [m], row by row.
-
-    Parameters
-    ----------
-    align
-        "se3" and "se2" remove the best rigid motion first ("se2": about and across the z axis
-        only), "none" removes nothing.
-    """
-    positions, true_positions = _same_shape(positions, true_positions)
-    if positions.shape[1] != 3:
-        raise ValueError(f"positions: expected shape (n, 3), got {positions.shape}")
-    alignment = Alignment(np.eye(3), np.zeros(3))
-    if align == "se3":
-        alignment = align_rigid(positions, true_positions)
-    elif align == "se2":
-        on_plane = align_rigid(positions[:, :2], true_positions[:, :2])
-        alignment.rotation[:2, :2] = on_plane.rotation
-        alignment.translation[:2] = on_plane.translation
-    elif align != "none":
-        raise ValueError(f'align: expected "none", "se2" or "se3", got {align!r}')
-    distance = np.linalg.norm(alignment.apply(positions) - true_positions, axis=1)
-    return TrajectoryError(
-        mean=float(distance.mean()),
-        rmse=float(np.sqrt(np.mean(distance**2))),
-        median=float(np.median(distance)),
-        max=float(distance.max()),
-        alignment=alignment,
-    )
-
-
-def center_errors(centers: Floats, true_centers: Floats, alignment: Alignment) -> Floats:
-    """Return the distance [m] of each object's centre from the true one after an alignment.
-
-    Both of shape (o, 3), row by row; the alignment usually comes from the trajectory. Shape (o,).
-    """
-    centers, true_centers = _same_shape(centers, true_centers)
-    return np.asarray(np.linalg.norm(alignment.apply(centers) - true_centers, axis=1))
-
-
-def _same_shape(points: Floats, true_points: Floats) -> tuple[Floats, Floats]:
-    points = as_floats("estimated points", points, [None, None])
-    true_points = as_floats("true points", true_points, [None, None])
-    if points.shape != true_points.shape:
-        raise ValueError(
-            f"estimated and true points differ in shape: {points.shape}, {true_points.shape}"
-        )
-    if not len(points):
-        raise ValueError("there are no points to compare")
-    return points, true_points
 
 
 def true_rows(object_ids: Ints, truth: Truth) -> Ints:

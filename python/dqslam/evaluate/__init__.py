@@ -1,0 +1,33 @@
+"""Errors of an estimate against the truth, as numbers with units; nothing here plots or prints."""
+
+from dqslam.evaluate.alignment import Align as Align
+from dqslam.evaluate.alignment import Alignment as Alignment
+from dqslam.evaluate.alignment import align_poses as align_poses
+from dqslam.evaluate.alignment import align_positions as align_positions
+from dqslam.evaluate.alignment import align_rigid as align_rigid
+from dqslam.evaluate.association import AssociationScore as AssociationScore
+from dqslam.evaluate.association import score_association as score_association
+from dqslam.evaluate.iou import box_iou as box_iou
+from dqslam.evaluate.iou import ellipsoid_iou as ellipsoid_iou
+from dqslam.evaluate.iou import match_boxes as match_boxes
+from dqslam.evaluate.iou import reprojection_iou as reprojection_iou
+from dqslam.evaluate.objects import Matches as Matches
+from dqslam.evaluate.objects import center_errors as center_errors
+from dqslam.evaluate.objects import match_by_id as match_by_id
+from dqslam.evaluate.objects import match_nearest as match_nearest
+from dqslam.evaluate.objects import orientation_error as orientation_error
+from dqslam.evaluate.objects import size_error as size_error
+from dqslam.evaluate.simulation import Report as Report
+from dqslam.evaluate.simulation import box_volumes as box_volumes
+from dqslam.evaluate.simulation import cube_volumes as cube_volumes
+from dqslam.evaluate.simulation import ellipsoid_volumes as ellipsoid_volumes
+from dqslam.evaluate.simulation import evaluate as evaluate
+from dqslam.evaluate.simulation import mean_distance as mean_distance
+from dqslam.evaluate.simulation import position_error as position_error
+from dqslam.evaluate.simulation import true_rows as true_rows
+from dqslam.evaluate.trajectory import RelativePoseError as RelativePoseError
+from dqslam.evaluate.trajectory import Statistics as Statistics
+from dqslam.evaluate.trajectory import TrajectoryError as TrajectoryError
+from dqslam.evaluate.trajectory import absolute_trajectory_error as absolute_trajectory_error
+from dqslam.evaluate.trajectory import relative_pose_error as relative_pose_error
+from dqslam.evaluate.trajectory import statistics as statistics
