@@ -27,6 +27,28 @@ void BindCovariance(py::module_& m) {
         "state"_a,
         py::call_guard<py::gil_scoped_release>(),
         "Marginal covariances at a state; at the true state, the posterior Cramer-Rao bound.");
+  m.def("joint_covariance",
+        &ComputeJointCovariance,
+        "graph"_a,
+        "options"_a,
+        "state"_a,
+        "poses"_a,
+        "objects"_a,
+        py::call_guard<py::gil_scoped_release>(),
+        "Joint covariance of some poses (k rows each), then objects (9 rows each).");
+
+  py::class_<OdometryFit>(m, "OdometryFit", "How well the odometry fits an estimate.")
+      .def_readonly("residuals", &OdometryFit::residuals, "In sigmas, shape (n, k).")
+      .def_readonly("leverage",
+                    &OdometryFit::leverage,
+                    "0..1, shape (n, k): 1 where the edge alone determines what it measures.");
+  m.def("odometry_fit",
+        &ComputeOdometryFit,
+        "graph"_a,
+        "options"_a,
+        "state"_a,
+        py::call_guard<py::gil_scoped_release>(),
+        "Residuals and leverage of the odometry: what variance components are estimated from.");
 }
 
 }  // namespace dqslam

@@ -24,4 +24,20 @@ struct Covariance {
 /// and std::runtime_error where a residual of the last stage is undefined at it.
 Covariance ComputeCovariance(const Graph& graph, const SolveOptions& options, const State& state);
 
+/// Joint covariance of some poses and objects, in the order given: their tangents, then their
+/// landmark parameters, each k or 9 rows.  Zero for a fixed pose.
+RowMatrix ComputeJointCovariance(const Graph& graph,
+                                 const SolveOptions& options,
+                                 const State& state,
+                                 const std::vector<int>& poses,
+                                 const std::vector<int>& objects);
+
+/// How well the odometry fits the estimate: what variance components are estimated from.
+struct OdometryFit {
+  RowMatrix residuals;  ///< (edges, k) in sigmas
+  RowMatrix leverage;   ///< (edges, k) 0..1: 1 where the edge alone determines what it measures
+};
+
+OdometryFit ComputeOdometryFit(const Graph& graph, const SolveOptions& options, const State& state);
+
 }  // namespace dqslam

@@ -85,6 +85,75 @@ TEST(ComputeCovariance, NamesAnObjectThatNothingDeterminesAndReturnsTheRest) {
   EXPECT_TRUE(covariance.poses.allFinite());
 }
 
+TEST(ComputeJointCovariance, HasTheMarginalsOnItsDiagonal) {
+  const Scene scene = MakeScene<Se3>(12);
+  const SolveOptions options;
+  const Covariance marginal = ComputeCovariance(scene.graph, options, scene.truth);
+  const RowMatrix joint =
+      ComputeJointCovariance(scene.graph, options, scene.truth, {7, 0, 3}, {4, 1});
+  ASSERT_EQ(joint.rows(), 3 * 6 + 2 * 9);
+  EXPECT_LT((joint - joint.transpose()).norm(), 1e-9 * joint.norm());
+  const auto expect_block = [&joint](int start, const Eigen::MatrixXd& expected) {
+    const int size = static_cast<int>(expected.rows());
+    EXPECT_LT((joint.block(start, start, size, size) - expected).norm(), 1e-9 * expected.norm())
+        << "block at " << start;
+  };
+  expect_block(0, Square(marginal.poses, 7));
+  EXPECT_EQ(joint.middleRows(6, 6).norm(), 0);  // the first pose is the gauge
+  expect_block(12, Square(marginal.poses, 3));
+  expect_block(18, Square(marginal.objects, 4));
+  expect_block(27, Square(marginal.objects, 1));
+  // Drift is common to a pose and what it sees: the difference is better known than either.
+  EXPECT_GT(joint.block(0, 18, 6, 9).norm(), 0);
+  EXPECT_THROW(ComputeJointCovariance(scene.graph, options, scene.truth, {12}, {}),
+               std::invalid_argument);
+  EXPECT_THROW(ComputeJointCovariance(scene.graph, options, scene.truth, {}, {5}),
+               std::invalid_argument);
+}
+
+TEST(ComputeOdometryFit, OdometryAloneFitsPerfectly) {
+  Scene scene = MakeScene<Se2>();
+  scene.graph.boxes = {
+      IndexVector(0), IndexVector(0), RowMatrix(0, 4), RowMatrix(0, 16), BoolTable(0, 4)};
+  scene.graph.size_prior = {Eigen::VectorXd(0), Eigen::VectorXd(0)};
+  const State state{scene.truth.poses, RowMatrix(0, kLandmarkSize)};
+  const OdometryFit fit = ComputeOdometryFit(scene.graph, SolveOptions(), state);
+  EXPECT_LT(fit.residuals.cwiseAbs().maxCoeff(), 1e-9);
+  EXPECT_LT((fit.leverage.array() - 1).abs().maxCoeff(), 1e-6);
+}
+
+// The squared residual of a measurement is 1 - leverage in the mean: what variance components
+// are estimated by.
+TEST(ComputeOdometryFit, LeverageTellsTheMeanSquaredResidual) {
+  constexpr int kRuns = 40;
+  Scene scene = MakeScene<Se2>();
+  const OdometryTable exact = scene.graph.odometry;
+  SolveOptions options;
+  Random random(5);
+  double squares = 0, redundancy = 0;
+  for (int run = 0; run < kRuns; ++run) {
+    for (int edge = 0; edge < exact.size(); ++edge) {
+      const Eigen::Vector3d noise = 0.02 * Eigen::Vector3d::NullaryExpr([&](Eigen::Index) {
+                                      return random.Normal();
+                                    });
+      Se2::Plus(exact.relative.row(edge).data(),
+                noise.data(),
+                scene.graph.odometry.relative.row(edge).data());
+    }
+    scene.graph.boxes.box = MakeScene<Se2>().graph.boxes.box;
+    for (int i = 0; i < scene.graph.boxes.box.size(); ++i) {
+      scene.graph.boxes.box.data()[i] += random.Normal();
+    }
+    const Solution solution = Solve(scene.graph, options, scene.truth);
+    const State state{solution.poses, solution.landmarks};
+    const OdometryFit fit = ComputeOdometryFit(scene.graph, options, state);
+    squares += fit.residuals.squaredNorm();
+    redundancy += (1 - fit.leverage.array()).sum();
+  }
+  EXPECT_GT(redundancy, 500);
+  EXPECT_NEAR(squares / redundancy, 1, 0.15);  // 4 sigmas of a chi-square of 1400
+}
+
 TEST(ComputeCovariance, RefusesAStateThatDoesNotFit) {
   Scene scene = MakeScene<Se2>();
   State state = scene.truth;

@@ -33,37 +33,37 @@ Sparse ChainWithLandmark(const std::vector<int>& sizes, Random& random) {
   return dense.sparseView();
 }
 
-TEST(DiagonalBlocksOfInverse, AgreesWithTheDenseInverse) {
+TEST(SelectedInverseTest, AgreesWithTheDenseInverse) {
   Random random(1);
   const std::vector<int> sizes = {3, 3, 3, 3, 3, 3, 9};
   const Sparse H = ChainWithLandmark(sizes, random);
   const Eigen::MatrixXd inverse = Eigen::MatrixXd(H).inverse();
-  const std::vector<Eigen::MatrixXd> blocks = DiagonalBlocksOfInverse(H, sizes);
-  ASSERT_EQ(blocks.size(), sizes.size());
+  const SelectedInverse selected(H);
   int offset = 0;
   for (size_t b = 0; b < sizes.size(); ++b) {
     const Eigen::MatrixXd expected = inverse.block(offset, offset, sizes[b], sizes[b]);
-    EXPECT_LT((blocks[b] - expected).norm(), 1e-9 * expected.norm()) << "block " << b;
+    EXPECT_LT((selected.Block(offset, sizes[b]) - expected).norm(), 1e-9 * expected.norm()) << "block " << b;
     offset += sizes[b];
   }
 }
 
-TEST(DiagonalBlocksOfInverse, ByHand) {
+TEST(SelectedInverseTest, ByHand) {
   Sparse H(2, 2);
   H.insert(0, 0) = 4;
   H.insert(0, 1) = 2;
   H.insert(1, 0) = 2;
   H.insert(1, 1) = 3;  // inverse: [3 -2; -2 4] / 8
-  const std::vector<Eigen::MatrixXd> blocks = DiagonalBlocksOfInverse(H, {1, 1});
-  EXPECT_DOUBLE_EQ(blocks[0](0, 0), 3.0 / 8);
-  EXPECT_DOUBLE_EQ(blocks[1](0, 0), 4.0 / 8);
+  const SelectedInverse selected(H);
+  EXPECT_DOUBLE_EQ(selected(0, 0), 3.0 / 8);
+  EXPECT_DOUBLE_EQ(selected(0, 1), -2.0 / 8);
+  EXPECT_DOUBLE_EQ(selected(1, 1), 4.0 / 8);
 }
 
-TEST(DiagonalBlocksOfInverse, RefusesAnIndefiniteMatrix) {
+TEST(SelectedInverseTest, RefusesAnIndefiniteMatrix) {
   Sparse H(2, 2);
   H.insert(0, 0) = 1;
   H.insert(1, 1) = -1;
-  EXPECT_THROW(DiagonalBlocksOfInverse(H, {1, 1}), std::runtime_error);
+  EXPECT_THROW(SelectedInverse{H}, std::runtime_error);
 }
 
 }  // namespace
