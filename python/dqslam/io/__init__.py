@@ -15,6 +15,10 @@ from dqslam.io.recording import Dropped as Dropped
 from dqslam.io.recording import OdometryNoise as OdometryNoise
 from dqslam.io.recording import load_recording as load_recording
 from dqslam.io.recording import nearest_pose as nearest_pose
+from dqslam.io.results import BoxTable as BoxTable
+from dqslam.io.results import MapObjects as MapObjects
+from dqslam.io.results import Results as Results
+from dqslam.io.results import load_results as load_results
 from dqslam.io.results import save_estimate as save_estimate
 from dqslam.io.sources import FormatNames as FormatNames
 from dqslam.io.sources import choose_frame_times as choose_frame_times
