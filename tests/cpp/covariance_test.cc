@@ -128,6 +128,7 @@ TEST(ComputeOdometryFit, LeverageTellsTheMeanSquaredResidual) {
   constexpr int kRuns = 40;
   Scene scene = MakeScene<Se2>();
   const OdometryTable exact = scene.graph.odometry;
+  const RowMatrix boxes = scene.graph.boxes.box;
   SolveOptions options;
   Random random(5);
   double squares = 0, redundancy = 0;
@@ -136,11 +137,11 @@ TEST(ComputeOdometryFit, LeverageTellsTheMeanSquaredResidual) {
       const Eigen::Vector3d noise = 0.02 * Eigen::Vector3d::NullaryExpr([&](Eigen::Index) {
                                       return random.Normal();
                                     });
-      Se2::Plus(exact.relative.row(edge).data(),
+      Plus<Se2>(exact.relative.row(edge).data(),
                 noise.data(),
                 scene.graph.odometry.relative.row(edge).data());
     }
-    scene.graph.boxes.box = MakeScene<Se2>().graph.boxes.box;
+    scene.graph.boxes.box = boxes;
     for (int i = 0; i < scene.graph.boxes.box.size(); ++i) {
       scene.graph.boxes.box.data()[i] += random.Normal();
     }
