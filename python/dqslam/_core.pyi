@@ -4,6 +4,7 @@ Geometry, costs and solvers of dqslam, in C++.
 
 from __future__ import annotations
 
+import collections.abc
 import enum
 import typing
 
@@ -18,6 +19,7 @@ __all__: list[str] = [
     "Loss",
     "Minimizer",
     "Mode",
+    "OdometryFit",
     "PoseModel",
     "Residual",
     "ScenePriors",
@@ -36,7 +38,9 @@ __all__: list[str] = [
     "dual_quadric_matrix",
     "ellipsoid_from_axes",
     "ellipsoid_from_dual_quadric",
+    "joint_covariance",
     "minus",
+    "odometry_fit",
     "plus",
     "project_to_boxes",
     "solve",
@@ -546,6 +550,21 @@ class Covariance:
         One sentence for each pose or object that nothing determines.
         """
 
+class OdometryFit:
+    """
+    How well the odometry fits an estimate.
+    """
+    @property
+    def leverage(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        0..1, shape (n, k): 1 where the edge alone determines what it measures.
+        """
+    @property
+    def residuals(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        In sigmas, shape (n, k).
+        """
+
 def axes_from_ellipsoid(
     ellipsoid: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[9, 1]"],
 ) -> tuple[
@@ -619,6 +638,17 @@ def ellipsoid_from_dual_quadric(
     Log-Cholesky parameters (9,) of q1 .. q9; ValueError when q is no ellipsoid.
     """
 
+def joint_covariance(
+    graph: Graph,
+    options: SolveOptions,
+    state: State,
+    poses: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex],
+    objects: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex],
+) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+    """
+    Joint covariance of some poses (k rows each), then objects (9 rows each).
+    """
+
 def minus(
     model: PoseModel,
     poses: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
@@ -626,6 +656,11 @@ def minus(
 ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
     """
     Tangents (n, k) that move the origins to the poses.
+    """
+
+def odometry_fit(graph: Graph, options: SolveOptions, state: State) -> OdometryFit:
+    """
+    Residuals and leverage of the odometry: what variance components are estimated from.
     """
 
 def plus(
