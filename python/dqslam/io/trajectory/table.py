@@ -13,6 +13,8 @@ from dqslam.io.files import FileError, parse_numbers
 
 # Files round quaternions to 4 digits, which costs up to 1e-4 of the norm; more is a mistake.
 NORM_TOLERANCE = 1e-3
+# What nine decimals cost; within it a quaternion keeps its digits.
+ROUNDING = 2e-9
 
 # Beyond any place on Earth, in any frame: numbers of another unit, or of another column.
 LARGEST_COORDINATE = 1e8
@@ -71,4 +73,5 @@ def _normalised(
     if bad.size:
         i = bad[0]
         raise FileError(path, f"quaternion has length {norm[i]:.6g}, not 1", int(lines[i]))
-    return np.column_stack([poses[:, :3], poses[:, 3:] / norm[:, None]])
+    divisor = np.where(np.abs(norm - 1) > ROUNDING, norm, 1.0)
+    return np.column_stack([poses[:, :3], poses[:, 3:] / divisor[:, None]])
