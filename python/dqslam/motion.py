@@ -113,7 +113,9 @@ def _measure_planar(motion: Motion, noise: PlanarOdometrySettings, random: Gener
             turn_sigma,
         ]
     )
-    error = sigma * random.normal(size=sigma.shape) * [1.0, 0.0, 1.0]  # nothing sideways
+    error = sigma * random.normal(size=sigma.shape)
+    if not noise.lateral_is_drawn:
+        error[:, 1] = 0.0
     measured = motion.relative + error
     # The error is along the axes of the previous pose; the covariance belongs to those of the next.
     next_from_previous = Rotation.from_rotvec(np.outer(-measured[:, 2], _UP)).as_matrix()

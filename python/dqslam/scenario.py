@@ -6,7 +6,7 @@ their unit.
 
 import tomllib
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
@@ -74,6 +74,18 @@ class CameraSettings(_Settings):
     position_in_robot_m: tuple[float, float, float]
 
 
+class LogNormalSizeSettings(_Settings):
+    """Ellipsoids of any orientation that are just what a size prior believes.
+
+    Half the logarithm of the shape S is log(median_m) I + log(spread) G, G symmetric and Gaussian,
+    of variance 1 on the diagonal and 1/2 beside it.
+    """
+
+    median_m: Positive
+    """Of the semi-axes' geometric mean."""
+    spread: Annotated[float, Field(gt=1.0)]
+
+
 class _ObjectSettings(_Settings):
     object_count: Count
     side_mean_m: Positive
@@ -81,6 +93,8 @@ class _ObjectSettings(_Settings):
     side_min_m: Positive
     semi_axis_factor: tuple[Positive, Positive]
     """Ellipsoids: semi-axis over half the side of the cube, uniform between these two."""
+    log_normal_size: LogNormalSizeSettings | None = None
+    """Ellipsoids: drawn like this instead, whatever side and factor say."""
 
     @model_validator(mode="after")
     def _factors_ascend(self) -> Self:
@@ -138,7 +152,9 @@ class PlanarOdometrySettings(_Settings):
     turn_rotation_sigma_rad: Positive
     """On the steps of a turn."""
     lateral_sigma_m: Positive
-    """What the covariance says of sideways motion; none is simulated."""
+    """What the covariance says of sideways motion, which (v, omega) has none of."""
+    lateral_is_drawn: bool = False
+    """Whether odometry errs sideways as its covariance says, or not at all."""
 
 
 class SpatialOdometrySettings(_Settings):
@@ -162,6 +178,8 @@ class RelativePositionSettings(_Settings):
 class Scenario(_Settings):
     """Everything that a simulated recording is made from, except the seed."""
 
+    name: str = "unnamed"
+    """When read from a file, that file's without its suffix."""
     objects: ObjectKind
     path: Annotated[PathSettings, Field(discriminator="kind")]
     camera: CameraSettings
@@ -183,6 +201,8 @@ class Scenario(_Settings):
 def load_scenario(source: str | Path) -> Scenario:
     """Read a scenario from a TOML file, or by the bare name of one that comes with dqslam.
 
+    A file may say `base = "NAME"`; it then only has what differs from that scenario.
+
     Raises
     ------
     FileNotFoundError
@@ -191,15 +211,31 @@ def load_scenario(source: str | Path) -> Scenario:
         When the file is no scenario; names the file and every wrong setting.
     """
     path = _find(source)
+    settings = _read(path)
+    if isinstance(base := settings.get("base"), str):
+        del settings["base"]
+        settings = _merged(_read(_find(base)), settings)
     try:
-        with path.open("rb") as file:
-            settings = tomllib.load(file)
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ValueError(f"{path}: not a TOML file: {error}") from None
-    try:
-        return Scenario.model_validate(settings)
+        return Scenario.model_validate({"name": path.stem} | settings)
     except ValidationError as error:
         raise ValueError(f"{path}: {_in_one_line(error)}") from None
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        with path.open("rb") as file:
+            return tomllib.load(file)
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ValueError(f"{path}: not a TOML file: {error}") from None
+
+
+def _merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
+    """Replace settings, section by section."""
+    result = base | changes
+    for name in base.keys() & changes.keys():
+        if isinstance(base[name], dict) and isinstance(changes[name], dict):
+            result[name] = base[name] | changes[name]
+    return result
 
 
 def _in_one_line(error: ValidationError) -> str:

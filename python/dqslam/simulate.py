@@ -12,7 +12,13 @@ from dqslam._core import Camera, PoseModel
 from dqslam.detector import associate, cut_at_border, is_detected
 from dqslam.motion import Motion, measure_odometry, move
 from dqslam.recording import Detections, Recording, RelativePositions, Truth
-from dqslam.scenario import CameraSettings, InsidePathSettings, OnTableSettings, Scenario
+from dqslam.scenario import (
+    CameraSettings,
+    InsidePathSettings,
+    LogNormalSizeSettings,
+    OnTableSettings,
+    Scenario,
+)
 
 # Axes of a level camera (x right, y down, z forward) on a mount (x forward, y left, z up).
 _MOUNT_FROM_CAMERA = [0.0, 0.0, 0.0, -0.5, 0.5, -0.5, 0.5]
@@ -23,8 +29,9 @@ _CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z i
 class _World(NamedTuple):
     center: Floats  # in the world, m, (o, 3)
     side: Floats  # of the cubes, m, (o,)
+    yaw: Floats  # of the cubes, rad, (o,)
     semi_axes: Floats  # of the ellipsoids, m, (o, 3)
-    yaw: Floats  # rad, (o,)
+    orientation: Floats  # of the ellipsoids, world_from_object, quaternions, (o, 4)
 
 
 def simulate(scenario: Scenario, *, seed: int) -> tuple[Recording, Truth]:
@@ -113,9 +120,35 @@ def _draw_world(scenario: Scenario, poses: Floats, random: Generator) -> _World:
     yaw = random.uniform(-np.pi, np.pi, size=world.object_count)
     factor = random.uniform(*world.semi_axis_factor, size=(world.object_count, 3))
     semi_axes = factor * side[:, None] / 2.0
+    orientation = np.column_stack([np.zeros((len(yaw), 2)), np.sin(yaw / 2.0), np.cos(yaw / 2.0)])
+    if world.log_normal_size is not None:
+        semi_axes, orientation = _log_normal(world.log_normal_size, world.object_count, random)
     if isinstance(world, OnTableSettings):
-        place[:, 2] += side / 2.0 if scenario.objects == "cubes" else semi_axes[:, 2]
-    return _World(place, side, semi_axes, yaw)
+        ellipsoid_height = _half_height(semi_axes, orientation)
+        place[:, 2] += side / 2.0 if scenario.objects == "cubes" else ellipsoid_height
+    return _World(place, side, yaw, semi_axes, orientation)
+
+
+def _log_normal(
+    size: LogNormalSizeSettings, count: int, random: Generator
+) -> tuple[Floats, Floats]:
+    """Draw ellipsoids from a size prior: semi-axes (o, 3) and orientations (o, 4)."""
+    from scipy.spatial.transform import Rotation
+
+    normal = random.normal(size=(count, 3, 3))
+    # Symmetric, with variance 1 on the diagonal and 1/2 beside it: alike from any side.
+    logarithm, axes = np.linalg.eigh((normal + normal.transpose(0, 2, 1)) / 2.0)
+    axes[:, :, 0] *= np.linalg.det(axes)[:, None]  # right-handed
+    semi_axes = size.median_m * size.spread**logarithm
+    return np.asarray(semi_axes), Rotation.from_matrix(axes).as_quat()
+
+
+def _half_height(semi_axes: Floats, orientation: Floats) -> Floats:
+    """Return how far ellipsoids go up from their centres, m, (o,)."""
+    from scipy.spatial.transform import Rotation
+
+    up_in_object = Rotation.from_quat(orientation).inv().apply(_UP)
+    return np.asarray(np.linalg.norm(semi_axes * up_in_object, axis=1))
 
 
 def _inside_path(world: InsidePathSettings, poses: Floats, random: Generator) -> Floats:
@@ -142,10 +175,7 @@ def _truth(scenario: Scenario, motion: Motion, world: _World) -> Truth:
     if scenario.objects == "cubes":
         ellipsoids, volume = None, world.side**3
     else:
-        upright = np.column_stack(
-            [np.zeros((count, 2)), np.sin(world.yaw / 2.0), np.cos(world.yaw / 2.0)]
-        )
-        rows = zip(world.center, world.semi_axes, upright, strict=True)
+        rows = zip(world.center, world.semi_axes, world.orientation, strict=True)
         ellipsoids = np.array([_core.ellipsoid_from_axes(*row) for row in rows])
         volume = 4.0 / 3.0 * np.pi * world.semi_axes.prod(axis=1)
     return Truth(

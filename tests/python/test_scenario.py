@@ -36,6 +36,31 @@ def test_a_name_and_its_path_are_the_same():
     assert load_scenario("paper") == load_scenario(PAPER) == load_scenario(str(PAPER))
 
 
+def test_a_file_may_only_have_what_differs(tmp_path):
+    path = tmp_path / "near.toml"
+    path.write_text('base = "paper"\nobjects = "ellipsoids"\n[world]\nmargin_m = 3.0\n')
+    near, paper = load_scenario(path), load_scenario("paper")
+    assert (near.name, near.objects, near.world.margin_m) == ("near", "ellipsoids", 3.0)
+    world = paper.world.model_copy(update={"margin_m": 3.0})
+    changes = {"name": "near", "objects": "ellipsoids", "world": world}
+    assert near == paper.model_copy(update=changes)
+
+
+@pytest.mark.parametrize(
+    ("base", "error", "message"),
+    [
+        ('"moon"', FileNotFoundError, "moon: no such scenario"),
+        ('"honest"', ValueError, "far.toml: .*base: Extra inputs are not permitted"),  # has a base
+        ("3", ValueError, "far.toml: .*base: Extra inputs are not permitted"),
+    ],
+)
+def test_a_base_is_a_whole_scenario(tmp_path, base, error, message):
+    path = tmp_path / "far.toml"
+    path.write_text(f"base = {base}\n")
+    with pytest.raises(error, match=message):
+        load_scenario(path)
+
+
 def test_objects_can_be_chosen(tmp_path):
     path = written(tmp_path, 'objects = "cubes"', 'objects = "ellipsoids"')
     assert load_scenario(path).objects == "ellipsoids"

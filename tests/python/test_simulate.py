@@ -2,6 +2,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import oracle
 from dqslam import _core, load_scenario, simulate
@@ -10,6 +11,7 @@ from dqslam.evaluate import position_error
 from dqslam.simulate import _cube_boxes, _World
 
 PAPER = load_scenario("paper")
+HONEST = load_scenario("honest")
 
 
 def changed(section, **values):
@@ -155,8 +157,9 @@ def test_a_cubes_box_bounds_its_corners():
     world = _World(
         center=np.array([[2.0, 6.0, 0.2], [-3.0, 5.0, -0.4], [0.0, -6.0, 0.0]]),
         side=np.array([0.5, 1.1, 0.4]),
-        semi_axes=np.ones((3, 3)),
         yaw=np.array([0.3, -2.0, 0.0]),
+        semi_axes=np.ones((3, 3)),
+        orientation=np.tile([0.0, 0.0, 0.0, 1.0], (3, 1)),
     )
     boxes, in_front = _cube_boxes(recording.camera, truth, world)
     for pose in range(40):
@@ -248,6 +251,53 @@ def test_odometry_covariance_weighs_the_noise_that_was_added():
     np.testing.assert_allclose(
         np.linalg.det(odometry.covariance), (0.02 * 0.005 * sigma) ** 2, rtol=1e-6
     )
+
+
+def test_an_honest_drive_errs_sideways_too_and_nowhere_else_differently():
+    """Its noise is white and of unit variance by its own covariance."""
+    drives = [simulate(HONEST, seed=seed) for seed in range(20)]
+    weighed, error = [], []
+    for recording, truth in drives:
+        odometry = recording.odometry
+        true = _core.between(PoseModel.SE2, truth.poses[:-1], truth.poses[1:])
+        tangent = _core.minus(PoseModel.SE2, true, odometry.relative)
+        weighed.append(
+            np.einsum("ni,nij,nj->n", tangent, np.linalg.inv(odometry.covariance), tangent)
+        )
+        error.append(odometry.relative - true)
+    assert np.mean(weighed) == pytest.approx(3.0, rel=0.05)
+    assert np.array(error)[:, :, 1].std() == pytest.approx(0.005, rel=0.05)
+    recording, truth = paper()
+    true = _core.between(PoseModel.SE2, truth.poses[:-1], truth.poses[1:])
+    np.testing.assert_allclose(
+        error[0][:, [0, 2]], (recording.odometry.relative - true)[:, [0, 2]], atol=1e-12
+    )
+
+
+def test_honest_sizes_are_what_the_size_prior_believes():
+    """Half the logarithm of S, less its mean: entries of variance 1, or 1/2 beside the diagonal."""
+    normal = []
+    for seed in range(100):
+        _, truth = simulate(HONEST, seed=seed)
+        for ellipsoid, volume in zip(truth.ellipsoids, truth.volume, strict=True):
+            _, axes, orientation = _core.axes_from_ellipsoid(ellipsoid)
+            assert volume == pytest.approx(4.0 / 3.0 * np.pi * np.prod(axes))
+            turn = Rotation.from_quat(orientation).as_matrix()
+            logarithm = turn @ np.diag(np.log(axes / 0.25)) @ turn.T
+            normal.append(logarithm / np.log(1.22))
+    normal = np.array(normal)
+    np.testing.assert_allclose(normal.mean(axis=0), 0.0, atol=0.15)
+    np.testing.assert_allclose(normal.var(axis=0), 0.5 * (np.eye(3) + 1.0), atol=0.12)
+
+
+def test_any_ellipsoid_stands_on_the_table():
+    orbit = load_scenario("orbit")
+    size = HONEST.world.log_normal_size.model_copy(update={"median_m": 0.07})
+    world = orbit.world.model_copy(update={"log_normal_size": size, "lift_max_m": 0.0})
+    _, truth = simulate(orbit.model_copy(update={"world": world}), seed=0)
+    for ellipsoid in truth.ellipsoids:
+        surface = oracle.ellipsoid_surface(*_core.axes_from_ellipsoid(ellipsoid), count=200)
+        assert surface[:, 2].min() == pytest.approx(0.0, abs=1e-4)
 
 
 def test_relative_positions_are_in_the_robots_frame():
