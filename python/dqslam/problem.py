@@ -37,6 +37,8 @@ class BoxNoise:
 
 # Two boxes do not tell an object's distance from its size.
 FEWEST_INLIER_VIEWS = 3
+# A few boxes fit some ellipsoid even if all of them are other objects'.
+LEAST_INLIER_SHARE = 1.0 / 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,8 +133,8 @@ def solve(
         ellipsoids = as_floats("solution.landmarks", solution.landmarks, [None, 9])
     else:
         ellipsoids = np.array([_ellipsoid_or_nan(q) for q in dual_quadrics]).reshape(-1, 9)
-    views = _inlier_views(graph.core, solution.inliers)
-    kept = views >= (0 if options.loss == _core.Loss.NONE else FEWEST_INLIER_VIEWS)
+    unfit = _unfit(graph, solution.inliers) if options.loss != _core.Loss.NONE else {}
+    kept = ~np.isin(graph.object_ids, list(unfit))
     estimate = Estimate(
         pose_model=graph.core.pose_model,
         camera=graph.core.camera,
@@ -145,13 +147,27 @@ def solve(
         dual_quadrics=dual_quadrics[kept],
         ellipsoids=ellipsoids[kept],
         inliers=solution.inliers,
-        dropped={
-            int(graph.object_ids[row]): f"seen in {views[row]} poses by boxes that fit, "
-            f"{FEWEST_INLIER_VIEWS} are needed"
-            for row in np.flatnonzero(~kept)
-        },
+        dropped=unfit,
     )
     return estimate, solution.summary
+
+
+def _unfit(graph: Graph, inliers: Bools) -> dict[int, str]:
+    """Say by id which objects too few boxes fit, and how few."""
+    views = _inlier_views(graph.core, inliers)
+    fit = np.bincount(graph.core.box_object[inliers], minlength=len(views))
+    reasons = {}
+    for row, object_id in enumerate(graph.object_ids.tolist()):
+        if views[row] < FEWEST_INLIER_VIEWS:
+            reasons[object_id] = (
+                f"seen in {views[row]} poses by boxes that fit, {FEWEST_INLIER_VIEWS} are needed"
+            )
+        elif fit[row] < LEAST_INLIER_SHARE * graph.observations[row]:
+            reasons[object_id] = (
+                f"{fit[row]} of {graph.observations[row]} boxes fit, "
+                f"{LEAST_INLIER_SHARE:.0%} are needed"
+            )
+    return reasons
 
 
 def _inlier_views(core: _core.Graph, inliers: Bools) -> Ints:

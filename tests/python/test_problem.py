@@ -241,6 +241,22 @@ def test_an_object_that_too_few_boxes_fit_is_dropped_with_a_robust_loss_only():
     assert len(estimate.ellipsoids) == len(estimate.class_names) == len(estimate.observations) == 3
 
 
+def test_an_object_that_a_small_part_of_its_boxes_fits_is_dropped_too():
+    """Four boxes of 13 fit: more than three views, but less than a third."""
+    recording, _ = noise_free()
+    detections = recording.detections
+    last = np.flatnonzero(detections.object_id == detections.object_id.max())
+    kept = np.ones(len(detections), dtype=bool)
+    kept[last[13:]] = False
+    box = detections.box.copy()
+    box[last[4:13]] += np.random.default_rng(0).uniform(-200.0, 200.0, size=(9, 1))
+    part = replace(recording, detections=replace(detections, box=box).select(kept))
+    graph = build_graph(part, **NO_PRIOR | {"size_prior": SizePrior(-1.0, 0.5)})
+    estimate, _ = solve(graph, SolveOptions(loss=Loss.CAUCHY))
+    gone = int(detections.object_id[last[0]])
+    assert estimate.dropped == {gone: "4 of 13 boxes fit, 33% are needed"}
+
+
 def test_a_solve_can_start_where_another_ended():
     recording, truth = noise_free()
     graph = build_graph(recording, **NO_PRIOR)
