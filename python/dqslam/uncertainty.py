@@ -122,6 +122,19 @@ def expected_distance(covariances: Floats) -> Floats:
     return np.asarray(2.0 * np.sqrt(2.0 / np.pi) * elliprg(*variances.T))
 
 
+def normalized_squares(errors: Floats, covariances: Floats) -> Floats:
+    """Return the squared errors (n, k) in sigmas of covariances (n, k, k), divided by k; (n,)."""
+    whitened = np.linalg.solve(covariances, errors[:, :, None])[:, :, 0]
+    return np.asarray((errors * whitened).mean(axis=1))
+
+
+def chi_square_interval(freedom: int) -> list[float]:
+    """Return where 95 % of chi-squares of these degrees of freedom lie, divided by them."""
+    from scipy.stats import chi2
+
+    return [float(chi2.ppf(share, freedom) / freedom) for share in (0.025, 0.975)]
+
+
 def _marginals(
     core: _core.Graph, object_ids: Any, options: SolveOptions, state: _core.State
 ) -> Marginals:

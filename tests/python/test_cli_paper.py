@@ -69,8 +69,20 @@ def test_the_bound_and_wrong_ids_add_to_each_row(tmp_path, capsys):
         assert 0.9 < row["inlier_precision"] <= 1.0
         assert row["volume_relative_error"]["med"] < 0.5
     shown = capsys.readouterr().out
-    for label in ("error / bound", "95 % interval", "inliers, recall", "told right ids"):
+    for label in ("error / bound", "95 % interval", "inliers, recall", "told ids: centres"):
         assert label in shown
+
+
+def test_another_scenario_stands_beside_nothing_printed(tmp_path, capsys):
+    command = ["paper", "--scenario", "honest", "--trials", "1", "--jobs", "1"]
+    assert main([*command, "--out", str(tmp_path)]) == 0
+    table = json.loads((tmp_path / "table.json").read_text())
+    assert (table["scenario"], table["objects"]) == ("honest", "ellipsoids")
+    assert table["monocular"]["worse_than_odometry"] == []
+    shown = capsys.readouterr().out
+    assert "honest, seeds 0 to 0, ellipsoids" in shown
+    assert "worse than odometry" in shown
+    assert "5.31" not in shown
 
 
 def test_failures_are_shown(tmp_path, capsys, monkeypatch):
@@ -94,6 +106,7 @@ def test_failures_are_shown(tmp_path, capsys, monkeypatch):
         (["--jobs", "0"], "--jobs"),
         (["--objects", "spheres"], "--objects"),
         (["--method", "magic"], "--method"),
+        (["--scenario", "moon"], "moon: no such scenario; by name there are: honest, orbit, paper"),
         (["--wrong-associations", "0.5"], "--wrong-associations"),
         (["--loss", "l1"], "'l1' is not one of 'none', 'huber', 'cauchy', 'dcs', 'switchable'"),
         (["--wrong-association-kind", "swap"], "'swap' is not one of 'random', 'structured'"),

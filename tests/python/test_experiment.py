@@ -4,13 +4,15 @@ import multiprocessing
 import numpy as np
 import pytest
 
-from dqslam import load_scenario
+from dqslam import BoxNoise, SizePrior, _core, load_scenario, simulate
 from dqslam.evaluate import Report
 from dqslam.experiment import (
+    Beliefs,
     Outcome,
     Settings,
     Statistics,
     Trial,
+    beliefs,
     example_maps,
     method_options,
     methods,
@@ -21,6 +23,7 @@ from dqslam.experiment import trial as trial_module
 from dqslam.experiment.scores import BoundScore, RobustScore
 
 PAPER = load_scenario("paper")
+HONEST = load_scenario("honest")
 
 
 def report(error):
@@ -53,6 +56,7 @@ def test_table_by_hand():
     assert table.as_dict() == {
         "trials": 3,
         "seed": 0,
+        "scenario": "paper",
         "objects": "cubes",
         "method": "dqslam",
         "loss": "none",
@@ -63,6 +67,7 @@ def test_table_by_hand():
             "rmse_volume": {"avg": 9.0, "med": 6.0, "max": 18.0},
             "volume_relative_error": {"avg": pytest.approx(0.2), "med": pytest.approx(0.2)},
             "failures": 0,
+            "worse_than_odometry": [2],
             "seconds_per_trial": {"med": 1.0},
         },
         "relative_position": {
@@ -71,6 +76,7 @@ def test_table_by_hand():
             "rmse_volume": {"avg": 4.5, "med": 3.0, "max": 9.0},
             "volume_relative_error": {"avg": pytest.approx(0.2), "med": pytest.approx(0.2)},
             "failures": 0,
+            "worse_than_odometry": [],
             "seconds_per_trial": {"med": 1.0},
         },
     }
@@ -95,9 +101,9 @@ def test_json_has_null_where_no_trial_succeeded(tmp_path):
 
 
 def test_scores_by_hand():
-    """Efficiency is mean error / mean bound; NEES are sums over the degrees of freedom."""
-    bounds = [BoundScore(0.5, 2.0, 3, 6.0, True), BoundScore(1.5, 7.0, 3, 3.0, False)]
-    robust = [RobustScore(1.0, 0.8, 0.3), RobustScore(0.9, 0.6, 0.5)]
+    """Efficiency is mean error / mean bound; the intervals are those of 6 degrees of freedom."""
+    bounds = [BoundScore(0.5, 1.0, 0.8, 3, 2.0, True), BoundScore(1.5, 2.0, 1.6, 3, 1.0, False)]
+    robust = [RobustScore(1.0, 0.8, 0.3, 0.1), RobustScore(0.9, 0.6, 0.5, 0.4)]
     outcomes = [
         Outcome(report(error), 1.0, bound=bound, robust=one)
         for error, bound, one in zip((1.0, 2.0), bounds, robust, strict=True)
@@ -109,14 +115,55 @@ def test_scores_by_hand():
     ]
     row = tabulate(trials, PAPER, Settings(bound=True)).as_dict()["monocular"]
     assert row["efficiency"] == pytest.approx(1.5 / 1.0)
-    assert row["anees"] == pytest.approx(9.0 / 6.0)
+    assert row["anees"] == pytest.approx(1.5)
+    assert row["anees_poses"] == pytest.approx(1.2)
     assert row["anees_interval"] == pytest.approx([1.2373 / 6.0, 14.4494 / 6.0], abs=1e-4)
     assert row["anees_objects"] == pytest.approx(1.5)
+    assert row["anees_objects_interval"] == row["anees_interval"]
     assert row["optimum_rate"] == 0.5
     assert row["inlier_precision"] == pytest.approx(0.95)
     assert row["inlier_recall"] == pytest.approx(0.7)
     assert row["oracle_rmse_pos"] == pytest.approx({"avg": 0.4, "med": 0.4, "max": 0.5})
+    assert row["oracle_rmse_landmark"] == pytest.approx({"avg": 0.25, "med": 0.25, "max": 0.4})
     assert row["failures"] == 1
+
+
+def test_trials_worse_than_their_odometry_are_named():
+    """The odometry of a report is 5 m off; a trial that failed is no worse than it."""
+    table = tabulate([trial(3, 6.0), trial(4, None), trial(5, 4.0)], PAPER, Settings())
+    assert table.best("monocular").worse_than_odometry == (3,)
+    written = table.as_dict()
+    assert written["monocular"]["worse_than_odometry"] == [3]
+    assert written["relative_position"]["worse_than_odometry"] == []
+
+
+def changed_world(**values):
+    world = PAPER.world.model_copy(update=values)
+    return PAPER.model_copy(update={"objects": "ellipsoids", "world": world})
+
+
+def test_the_bound_of_ellipsoids_is_that_of_an_estimator_that_knows_noise_and_sizes():
+    told = beliefs(HONEST, Settings(bound=True))
+    assert told.box_noise == BoxNoise(1.0, 0.0)
+    assert told.size_prior == SizePrior(np.log(0.25), np.log(1.22))
+    assert beliefs(HONEST, Settings()) == beliefs(PAPER, Settings(bound=True)) == Beliefs()
+
+
+@pytest.mark.parametrize(
+    "world",
+    [
+        {},
+        {"side_mean_m": 2.0, "side_sigma_m": 0.0},
+        {"side_sigma_m": 0.01, "semi_axis_factor": (0.2, 3.0)},
+    ],
+)
+def test_true_sizes_are_those_that_are_drawn(world):
+    scenario = changed_world(**world)
+    prior = beliefs(scenario, Settings(bound=True)).size_prior
+    truths = [simulate(scenario, seed=seed)[1] for seed in range(40)]
+    axes = [_core.axes_from_ellipsoid(row)[1] for one in truths for row in one.ellipsoids]
+    assert prior.log_mean == pytest.approx(np.log(axes).mean(), abs=0.06)
+    assert prior.log_sigma == pytest.approx(np.log(axes).std(), rel=0.06)
 
 
 def test_the_scan_keeps_every_weight_and_the_best_is_used(monkeypatch):
@@ -190,6 +237,7 @@ def test_estimates_of_ellipsoids_are_at_the_optimum_and_know_their_error():
         assert 0.4 < row["efficiency"] < 1.8
         low, high = row["anees_interval"]
         assert 0.5 * low < row["anees"] < 1.5 * high
+        assert 0.5 * low < row["anees_poses"] < 1.5 * high
         assert 0.05 < row["anees_objects"] < 3.0
         assert row["volume_relative_error"]["med"] < 0.05
 
@@ -204,6 +252,7 @@ def test_wrong_ids_are_found():
     assert row["inlier_precision"] > 0.97
     assert row["inlier_recall"] > 0.85
     assert row["rmse_pos"]["avg"] < 1.5 * row["oracle_rmse_pos"]["avg"] + 0.02
+    assert row["rmse_landmark"]["avg"] < 1.5 * row["oracle_rmse_landmark"]["avg"] + 0.05
 
 
 def test_the_papers_method_depends_on_its_weight(monkeypatch):

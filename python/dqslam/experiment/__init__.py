@@ -2,10 +2,12 @@
 
 from dqslam.experiment.methods import LOSSES as LOSSES
 from dqslam.experiment.methods import ROWS as ROWS
+from dqslam.experiment.methods import Beliefs as Beliefs
 from dqslam.experiment.methods import LossName as LossName
 from dqslam.experiment.methods import Method as Method
 from dqslam.experiment.methods import RowName as RowName
 from dqslam.experiment.methods import Settings as Settings
+from dqslam.experiment.methods import beliefs as beliefs
 from dqslam.experiment.methods import method_options as method_options
 from dqslam.experiment.paper import example_maps as example_maps
 from dqslam.experiment.paper import run_paper as run_paper

@@ -1,13 +1,16 @@
 """Which estimator a trial runs, and what it is given."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal, get_args
+
+import numpy as np
 
 from dqslam import _core
 from dqslam._core import SolveOptions
-from dqslam.problem import BoxNoise
+from dqslam.problem import BoxNoise, Graph, build_graph
 from dqslam.recording import Recording
-from dqslam.scenario import Scenario
+from dqslam.scenario import Scenario, WorldSettings
+from dqslam.size_prior import SizePrior
 
 Method = Literal["dqslam", "paper"]
 LossName = Literal["none", "huber", "cauchy", "dcs", "switchable", "gnc_tls", "gnc_gm"]
@@ -68,15 +71,46 @@ def method_options(settings: Settings, algebraic_sigma: float | None = None) -> 
     )
 
 
-def box_noise(scenario: Scenario, settings: Settings) -> BoxNoise:
-    """Return what is assumed of boxes: the defaults, or what is true where a bound needs it.
+@dataclass(frozen=True)
+class Beliefs:
+    """What is assumed of boxes and objects."""
 
-    Covariances and their bound only mean something if the sigmas are right, which for ellipsoids
-    is the detector's; cubes have no right one.
+    box_noise: BoxNoise = field(default_factory=BoxNoise)
+    size_prior: SizePrior = field(default_factory=SizePrior)
+
+    def graph(self, recording: Recording) -> Graph:
+        """Lay out a recording as a problem."""
+        return build_graph(recording, box_noise=self.box_noise, size_prior=self.size_prior)
+
+
+def beliefs(scenario: Scenario, settings: Settings) -> Beliefs:
+    """Return the defaults, or what is true where a bound needs it.
+
+    Covariances and their bound only mean something if the sigmas are right: for ellipsoids those
+    of the detector and of the world; cubes have no right ones.
     """
     if settings.bound and scenario.objects == "ellipsoids":
-        return BoxNoise(pixels=scenario.detector.edge_sigma_px, relative=0.0)
-    return BoxNoise()
+        noise = BoxNoise(pixels=scenario.detector.edge_sigma_px, relative=0.0)
+        return Beliefs(noise, true_size_prior(scenario.world))
+    return Beliefs()
+
+
+def true_size_prior(world: WorldSettings) -> SizePrior:
+    """Return mean and sigma of the logarithm of the semi-axes that a world's ellipsoids have."""
+    from scipy.stats import norm
+
+    size = world.log_normal_size
+    if size is not None:
+        return SizePrior(float(np.log(size.median_m)), float(np.log(size.spread)))
+    shares = (np.arange(1000) + 0.5) / 1000.0  # quantiles stand for the distribution
+    side = world.side_mean_m + world.side_sigma_m * norm.ppf(shares)
+    log_side = np.log(np.maximum(side, world.side_min_m))
+    low, high = world.semi_axis_factor
+    log_factor = np.log(low + (high - low) * shares)
+    return SizePrior(
+        float(log_side.mean() + log_factor.mean() - np.log(2.0)),
+        float(np.hypot(log_side.std(), log_factor.std())),
+    )
 
 
 def seen_by(row: RowName, recording: Recording) -> Recording:

@@ -9,7 +9,7 @@ from dqslam.experiment.methods import (
     LossName,
     Method,
     Settings,
-    box_noise,
+    beliefs,
     default_loss,
     method_options,
     seen_by,
@@ -17,7 +17,7 @@ from dqslam.experiment.methods import (
 from dqslam.experiment.table import PaperTable, tabulate
 from dqslam.experiment.trial import Trial, run_trial
 from dqslam.pool import run_each
-from dqslam.problem import build_graph, solve
+from dqslam.problem import solve
 from dqslam.recording import Truth
 from dqslam.scenario import Scenario
 from dqslam.simulate import simulate
@@ -44,7 +44,8 @@ def run_paper(
         The robust loss on boxes; by default none, or one that suits where some ids are wrong.
     bound
         Whether to compare with the posterior bound and the optimum, which takes some more solves.
-        The estimator is then told the true noise of the boxes, where they have one (ellipsoids).
+        The estimator is then told the true noise of the boxes and the true spread of the sizes,
+        where there are such (ellipsoids).
     jobs
         Processes; with 1 everything runs in this one. The numbers do not depend on it, times do.
     progress
@@ -71,12 +72,11 @@ def example_maps(table: PaperTable, count: int) -> list[tuple[str, Estimate, Tru
     """Solve the first monocular trials that succeeded again: title, estimate, truth of each."""
     row = table.best("monocular")
     options = method_options(table.settings, row.algebraic_sigma)
-    noise = box_noise(table.scenario, table.settings)
+    believed = beliefs(table.scenario, table.settings)
     maps = []
     for seed in [seed for seed in table.seeds if seed not in row.failures][:count]:
         recording, truth = simulate(table.scenario, seed=seed)
-        graph = build_graph(seen_by("monocular", recording), box_noise=noise)
-        estimate, _ = solve(graph, options)
+        estimate, _ = solve(believed.graph(seen_by("monocular", recording)), options)
         report = evaluate(estimate, truth)
         errors = f"odometry {report.odometry_rmse_pos:.2f} m, estimate {report.rmse_pos:.2f} m"
         maps.append((f"seed {seed}: {errors}", estimate, truth))

@@ -7,13 +7,20 @@ from typing import Any
 import numpy as np
 
 from dqslam import _core
-from dqslam._checks import Bools, Floats
+from dqslam._checks import Bools
 from dqslam._core import SolveOptions, Summary
 from dqslam.estimate import Estimate
-from dqslam.evaluate import position_error, true_rows
-from dqslam.problem import BoxNoise, Graph, build_graph, solve
+from dqslam.evaluate import evaluate, true_rows
+from dqslam.experiment.methods import Beliefs
+from dqslam.problem import Graph, solve
 from dqslam.recording import Recording, Truth
-from dqslam.uncertainty import marginal_covariances, posterior_bound, true_state
+from dqslam.uncertainty import (
+    chi_square_interval,
+    marginal_covariances,
+    normalized_squares,
+    posterior_bound,
+    true_state,
+)
 
 # Half a chi-square of 0.1: estimates that differ by less are the same.
 SAME_COST = 0.05
@@ -25,11 +32,13 @@ class BoundScore:
 
     bound: float
     """Expected mean position error, metres."""
+    last_pose_nees: float
+    """Squared error of the last pose in sigmas of its own covariance, by degrees of freedom."""
     pose_nees: float
-    """Squared error of the last pose, in sigmas of its own covariance."""
+    """The same, mean over all poses but the first, which is fixed."""
     pose_dof: int
     center_nees: float
-    """The same for the centre of the first object; 3 degrees of freedom."""
+    """The same, mean over the centres of the mapped objects; 3 degrees of freedom."""
     is_optimum: bool
     """Whether a start at the truth ends no lower."""
 
@@ -44,6 +53,8 @@ class RobustScore:
     """Share of the boxes with the right id that are called inliers."""
     oracle_rmse_pos: float
     """Mean position error of the run that is told the right ones, metres."""
+    oracle_rmse_landmark: float
+    """Mean error of its centres, metres."""
 
 
 def score_bound(
@@ -59,16 +70,17 @@ def score_bound(
     """
     estimate, summary = solved
     covariance = marginal_covariances(graph, estimate, options)
-    last = [truth.poses[-1:], estimate.poses[-1:]]
-    pose_error = _core.minus(truth.pose_model, *last)[0]
-    first_row = true_rows(estimate.object_ids[:1], truth)
-    center_error = (truth.center[first_row] - estimate.centers[:1])[0]
+    pose_error = _core.minus(truth.pose_model, truth.poses, estimate.poses)[1:]
+    pose_nees = normalized_squares(pose_error, covariance.poses[1:])
+    rows = true_rows(estimate.object_ids, truth)
+    center_nees = normalized_squares(truth.center[rows] - estimate.centers, covariance.centers)
     _, from_truth = solve(graph, options, start=true_state(graph, truth, options))
     return BoundScore(
         bound=posterior_bound(right_graph, truth).position_error,
-        pose_nees=_squared_sigmas(pose_error, covariance.poses[-1]),
-        pose_dof=len(pose_error),
-        center_nees=_squared_sigmas(center_error, covariance.centers[0]),
+        last_pose_nees=float(pose_nees[-1]),
+        pose_nees=float(pose_nees.mean()),
+        pose_dof=pose_error.shape[1],
+        center_nees=float(np.nanmean(center_nees)),  # NaN: nothing determines the object
         is_optimum=bool(summary.final_cost <= from_truth.final_cost + SAME_COST),
     )
 
@@ -79,43 +91,38 @@ def score_robust(
     """Score which boxes fit, against which have the right id (b,); options: of the told run."""
     found = estimate.inliers & right
     told, _ = solve(right_graph, options)
+    report = evaluate(told, truth)
     return RobustScore(
         precision=float(found.sum() / max(estimate.inliers.sum(), 1)),
         recall=float(found.sum() / max(right.sum(), 1)),
-        oracle_rmse_pos=position_error(truth.pose_model, told.poses, truth.poses),
+        oracle_rmse_pos=report.rmse_pos,
+        oracle_rmse_landmark=report.rmse_landmark,
     )
 
 
-def right_graph_of(recording: Recording, right: Bools, noise: BoxNoise) -> Graph:
+def right_graph_of(recording: Recording, right: Bools, believed: Beliefs) -> Graph:
     """Return the problem of the boxes that have the right id (b,)."""
     detections = recording.detections.select(right)
     positions = recording.positions
     if positions is not None:
         positions = positions.select(np.isin(positions.object_id, detections.object_id))
-    part = replace(recording, detections=detections, positions=positions)
-    return build_graph(part, box_noise=noise)
+    return believed.graph(replace(recording, detections=detections, positions=positions))
 
 
 def summarise_bound(scores: Sequence[BoundScore], rmse_pos: Sequence[float]) -> dict[str, Any]:
-    """Average over trials; NEES is divided by its degrees of freedom, so that 1 is expected."""
+    """Average over trials; of an honest NEES the mean is 1, and in its interval in 95 % of cases.
+
+    The interval is that of one pose, or one object, a trial. A mean over all of them scatters less,
+    by how much depends on how they are correlated.
+    """
     if not scores:
         return {}
-    freedom = sum(score.pose_dof for score in scores)
     return {
         "efficiency": float(np.mean(rmse_pos) / np.mean([score.bound for score in scores])),
-        "anees": sum(score.pose_nees for score in scores) / freedom,
-        "anees_interval": chi_square_interval(freedom),
-        "anees_objects": float(np.mean([score.center_nees for score in scores]) / 3.0),
+        "anees": float(np.mean([score.last_pose_nees for score in scores])),
+        "anees_poses": float(np.mean([score.pose_nees for score in scores])),
+        "anees_interval": chi_square_interval(sum(score.pose_dof for score in scores)),
+        "anees_objects": float(np.mean([score.center_nees for score in scores])),
+        "anees_objects_interval": chi_square_interval(3 * len(scores)),
         "optimum_rate": float(np.mean([score.is_optimum for score in scores])),
     }
-
-
-def chi_square_interval(freedom: int) -> list[float]:
-    """Return where 95 % of chi-squares of these degrees of freedom lie, divided by them."""
-    from scipy.stats import chi2
-
-    return [float(chi2.ppf(share, freedom) / freedom) for share in (0.025, 0.975)]
-
-
-def _squared_sigmas(error: Floats, covariance: Floats) -> float:
-    return float(error @ np.linalg.solve(covariance, error))

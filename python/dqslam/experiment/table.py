@@ -59,6 +59,8 @@ class TableRow:
     seconds_med: float
     failures: dict[int, str]
     """Why a trial failed, by its seed."""
+    worse_than_odometry: tuple[int, ...] = ()
+    """Seeds of the trials whose positions are further off than those of odometry alone."""
     scores: dict[str, Any] = field(default_factory=dict)
     """What the bound and wrong ids add, by name; of the trials that succeeded."""
 
@@ -70,6 +72,7 @@ class TableRow:
             "volume_relative_error": {"avg": volume.avg, "med": volume.med},
             **self.scores,
             "failures": len(self.failures),
+            "worse_than_odometry": list(self.worse_than_odometry),
             "seconds_per_trial": {"med": self.seconds_med},
         }
 
@@ -106,6 +109,7 @@ class PaperTable:
         table: dict[str, Any] = {
             "trials": len(self.seeds),
             "seed": self.seeds[0],
+            "scenario": self.scenario.name,
             "objects": self.scenario.objects,
             "method": self.method,
             "loss": self.settings.loss,
@@ -167,6 +171,12 @@ def _table_row(sigma: float | None, outcomes: dict[int, Outcome]) -> TableRow:
         failures={
             seed: outcome.failure for seed, outcome in outcomes.items() if outcome.report is None
         },
+        worse_than_odometry=tuple(
+            seed
+            for seed, outcome in outcomes.items()
+            if outcome.report is not None
+            and outcome.report.rmse_pos > outcome.report.odometry_rmse_pos
+        ),
         scores=_scores(list(outcomes.values())),
     )
 
@@ -184,6 +194,7 @@ def _scores(outcomes: Sequence[Outcome]) -> dict[str, Any]:
     if robust:
         scores["inlier_precision"] = float(np.mean([score.precision for score in robust]))
         scores["inlier_recall"] = float(np.mean([score.recall for score in robust]))
-        oracle = Statistics.of([score.oracle_rmse_pos for score in robust])
-        scores["oracle_rmse_pos"] = asdict(oracle)
+        for name in ("oracle_rmse_pos", "oracle_rmse_landmark"):
+            told = Statistics.of([getattr(score, name) for score in robust])
+            scores[name] = asdict(told)
     return scores

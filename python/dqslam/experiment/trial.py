@@ -8,9 +8,10 @@ from dqslam._core import SolveOptions
 from dqslam.evaluate import Report, evaluate, position_error
 from dqslam.experiment.methods import (
     ROWS,
+    Beliefs,
     RowName,
     Settings,
-    box_noise,
+    beliefs,
     candidate_sigmas,
     method_options,
     seen_by,
@@ -22,7 +23,7 @@ from dqslam.experiment.scores import (
     score_bound,
     score_robust,
 )
-from dqslam.problem import BoxNoise, build_graph, solve
+from dqslam.problem import solve
 from dqslam.recording import Recording, Truth
 from dqslam.scenario import Scenario
 from dqslam.simulate import simulate
@@ -56,13 +57,13 @@ def run_trial(scenario: Scenario, seed: int, settings: Settings) -> Trial:
     recording, truth = simulate(scenario, seed=seed)
     odometry = recording.odometry
     poses = _core.dead_reckon(odometry.pose_model, odometry.first_pose, odometry.relative)
-    noise = box_noise(scenario, settings)
+    believed = beliefs(scenario, settings)
     return Trial(
         seed=seed,
         odometry_rmse_pos=position_error(truth.pose_model, poses, truth.poses),
         outcomes={
             row: tuple(
-                _outcome(seen_by(row, recording), truth, noise, settings, sigma)
+                _outcome(seen_by(row, recording), truth, believed, settings, sigma)
                 for sigma in candidate_sigmas(settings.method)
             )
             for row in ROWS
@@ -71,18 +72,18 @@ def run_trial(scenario: Scenario, seed: int, settings: Settings) -> Trial:
 
 
 def _outcome(
-    recording: Recording, truth: Truth, noise: BoxNoise, settings: Settings, sigma: float | None
+    recording: Recording, truth: Truth, believed: Beliefs, settings: Settings, sigma: float | None
 ) -> Outcome:
     start = time.perf_counter()
     seconds = None
     try:
         options = method_options(settings, sigma)
-        graph = build_graph(recording, box_noise=noise)
+        graph = believed.graph(recording)
         solved = solve(graph, options)
         seconds = time.perf_counter() - start
         report = evaluate(solved[0], truth)
         right = recording.detections.object_id == truth.box_object_id
-        right_graph = graph if right.all() else right_graph_of(recording, right, noise)
+        right_graph = graph if right.all() else right_graph_of(recording, right, believed)
         bound = robust = None
         if settings.bound:
             bound = score_bound(graph, right_graph, truth, solved, options)
