@@ -39,9 +39,10 @@ class CsvTable:
         """Return a column as finite numbers, shape (n,)."""
         return parse_numbers(self.path, name, self.columns[name], self.lines)
 
-    def integers(self, name: str) -> Ints:
-        """Return a column as whole numbers, shape (n,)."""
-        return parse_integers(self.path, name, self.columns[name], self.lines)
+    def integers(self, name: str, *, empty: str = "") -> Ints:
+        """Return a column as whole numbers, shape (n,); an empty cell stands for ``empty``."""
+        cells = [cell or empty for cell in self.columns[name]]
+        return parse_integers(self.path, name, cells, self.lines)
 
     def flags(self, name: str) -> Bools:
         """Return a column of 0 and 1, shape (n,)."""

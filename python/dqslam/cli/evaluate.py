@@ -1,0 +1,169 @@
+"""``dqslam evaluate``: a directory of results against the truth."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+
+def evaluate(
+    directory: Annotated[Path, typer.Argument(metavar="DIR", help="What `dqslam run` wrote.")],
+    groundtruth: Annotated[
+        Path, typer.Option(help="True trajectory, world_from_camera, in any world frame.")
+    ],
+    align: Annotated[
+        Literal["se3", "sim3", "se2", "none"],
+        typer.Option(help="Motion between both worlds to remove: rigid, with scale, on the plane."),
+    ] = "se3",
+    rpe_delta: Annotated[float, typer.Option(help="Relative pose error: over how much.")] = 1.0,
+    rpe_unit: Annotated[Literal["frames", "metres"], typer.Option(help="Of that.")] = "frames",
+    objects: Annotated[
+        Path | None, typer.Option(help="CSV of true objects: x,y,z,class_name,sx,sy,sz,...")
+    ] = None,
+    match: Annotated[
+        Literal["nearest", "id"], typer.Option(help="Which object is which true one.")
+    ] = "nearest",
+    gate: Annotated[
+        float | None,
+        typer.Option(
+            help="Metres within which a nearest one counts. Default: the object's longest side, "
+            "1 m where sizes are unknown."
+        ),
+    ] = None,
+    boxes: Annotated[
+        Path | None, typer.Option(help="CSV of boxes of known objects: judges the association.")
+    ] = None,
+    box_ids: Annotated[str, typer.Option(help="Its column of object ids.")] = "track_id",
+    max_time_difference: Annotated[
+        float | None,
+        typer.Option(help="Seconds that count as the same. Default: half the interval of poses."),
+    ] = None,
+    json: Annotated[
+        bool, typer.Option("--json", help="Print evaluation.json instead of tables.")
+    ] = False,
+) -> None:
+    """Compare the trajectory, the objects and the boxes of DIR with the truth.
+
+    Writes DIR/evaluation.json; docs/evaluation.md says what each number is.
+    """
+    from rich.console import Console
+
+    from dqslam import io
+    from dqslam.evaluate_results import evaluate_results
+
+    if gate is not None and not gate > 0.0:
+        raise ValueError(f"--gate: {gate:g} is not positive")
+    if max_time_difference is not None and not max_time_difference >= 0.0:
+        raise ValueError(f"--max-time-difference: {max_time_difference:g} is negative")
+    results = io.load_results(directory)
+    evaluation = evaluate_results(
+        results,
+        io.read_trajectory(groundtruth, repeated_times=True),
+        align=align,
+        rpe_delta=rpe_delta,
+        rpe_unit=rpe_unit,
+        objects=None if objects is None else io.read_true_objects(objects),
+        match=match,
+        gate=gate,
+        boxes=None if boxes is None else io.read_true_boxes(boxes, results.camera, box_ids),
+        max_time_difference=max_time_difference,
+    )
+    path = directory / "evaluation.json"
+    io.write_json(path, evaluation)
+    if json:
+        typer.echo(path.read_text(encoding="utf-8"), nl=False)
+        return
+    console = Console()
+    console.print(_trajectory(evaluation))
+    console.print(_boxes_and_objects(evaluation))
+    if evaluation["objects"] is not None:
+        console.print(_pairs(evaluation["objects"]["pairs"]))
+    console.print(f"wrote {path}", markup=False, highlight=False, soft_wrap=True)
+
+
+def _trajectory(evaluation: dict[str, Any]) -> "Table":
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    rpe = evaluation["rpe"]
+    over = f"{rpe['delta']:g} {rpe['unit']}"
+    table = Table(title=f"{evaluation['poses']} poses, {evaluation['align']}", box=SIMPLE_HEAD)
+    for heading in ("", "rmse", "mean", "median", "max"):
+        table.add_column(heading, justify="right" if heading else "left")
+    for title, key in (("odometry", "odometry_"), ("estimate", "")):
+        absolute, relative = evaluation[f"{key}ate"], evaluation[f"{key}rpe"]
+        rows = (
+            ("position, m", absolute),
+            (f"motion over {over}, m", relative["translation"]),
+            (f"turn over {over}, deg", relative["rotation_deg"]),
+        )
+        for what, errors in rows:
+            shown = (f"{errors[name]:.4f}" for name in ("rmse", "mean", "median", "max"))
+            table.add_row(f"{title}: {what}", *shown)
+    return table
+
+
+def _boxes_and_objects(evaluation: dict[str, Any]) -> "Table":
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    table = Table(box=SIMPLE_HEAD, show_header=False)
+    overlap = evaluation["reprojection_iou"]
+    if overlap is None:
+        table.add_row("boxes", "unknown: there is no boxes.csv")
+    else:
+        parts = (
+            ("all", overlap),
+            ("fitting", overlap["inliers"]),
+            ("held out", overlap["held_out"]),
+        )
+        shown = (f"{name} {_number(p['median'])} ({p['boxes']})" for name, p in parts)
+        table.add_row("IoU with the boxes, median", ", ".join(shown))
+    association = evaluation["association"]
+    if association is not None:
+        names = ("precision", "recall", "purity")
+        shares = ", ".join(f"{name} {_number(association[name])}" for name in names)
+        table.add_row("association", f"{shares}, {association['id_switches']} id switches")
+        counted = ("found", "missed", "split", "invented")
+        table.add_row("its objects", ", ".join(f"{association[name]} {name}" for name in counted))
+    objects = evaluation["objects"]
+    if objects is None:
+        return table
+    counts = ", ".join(f"{objects[name]} {name}" for name in ("matched", "missed", "invented"))
+    how = "id" if objects["match"] == "id" else "distance"
+    how += " and class" if objects["by_class"] else ""
+    table.add_row("objects", f"{counts}, by {how}; {objects['moving_in_map']} in the map move")
+    rows = (
+        ("centres, m", "center", ("median", "mean", "max")),
+        ("sizes, relative", "size_relative", ("median", "mean", "max")),
+        ("volume, ratio", "volume_ratio", ("median",)),
+        ("orientation, deg", "orientation_deg", ("median", "mean", "max")),
+        ("IoU in space", "iou_3d", ("median", "mean")),
+    )
+    for title, name, wanted in rows:
+        values = (f"{which} {_number(objects[f'{name}_{which}'])}" for which in wanted)
+        table.add_row(title, ", ".join(values))
+    return table
+
+
+def _pairs(pairs: list[dict[str, Any]]) -> "Table":
+    from rich.box import SIMPLE_HEAD
+    from rich.markup import escape
+    from rich.table import Table
+
+    names = ("center", "size_relative", "volume_ratio", "orientation_deg", "iou_3d")
+    table = Table(box=SIMPLE_HEAD)
+    for heading in ("id", "true id", "class", "centre, m", "size", "volume", "turn, deg", "IoU"):
+        table.add_column(heading, justify="left" if heading == "class" else "right")
+    for pair in pairs:
+        true_id = "" if pair["true_id"] is None else str(pair["true_id"])
+        values = (_number(pair[name]) for name in names)
+        table.add_row(str(pair["id"]), true_id, escape(pair["class_name"]), *values)
+    return table
+
+
+def _number(value: float | None) -> str:
+    return "" if value is None else f"{value:.3g}"

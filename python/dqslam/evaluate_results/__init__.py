@@ -1,0 +1,8 @@
+"""Results from files against the truth from files: all that ``dqslam evaluate`` reports."""
+
+from dqslam.evaluate_results.boxes import judge_association as judge_association
+from dqslam.evaluate_results.boxes import judge_reprojection as judge_reprojection
+from dqslam.evaluate_results.evaluation import evaluate_results as evaluate_results
+from dqslam.evaluate_results.objects import judge_objects as judge_objects
+from dqslam.evaluate_results.trajectory import common_poses as common_poses
+from dqslam.evaluate_results.trajectory import judge_trajectory as judge_trajectory

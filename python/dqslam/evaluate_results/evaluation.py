@@ -1,0 +1,96 @@
+"""Put all judgements of a directory of results together."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from dqslam._checks import Floats
+from dqslam.evaluate import Align, Alignment, align_poses
+from dqslam.evaluate_results.boxes import judge_association, judge_reprojection
+from dqslam.evaluate_results.objects import Match, judge_objects
+from dqslam.evaluate_results.trajectory import common_poses, judge_trajectory
+from dqslam.io import Results, Trajectory, TrueBoxes, TrueObjects
+
+
+def evaluate_results(
+    results: Results,
+    groundtruth: Trajectory,
+    *,
+    align: Align = "se3",
+    rpe_delta: float = 1.0,
+    rpe_unit: Literal["frames", "metres"] = "frames",
+    objects: TrueObjects | None = None,
+    match: Match = "nearest",
+    gate: float | None = None,
+    boxes: TrueBoxes | None = None,
+    max_time_difference: float | None = None,
+) -> dict[str, Any]:
+    """Return what ``evaluation.json`` holds: docs/evaluation.md has every key and unit.
+
+    Parameters
+    ----------
+    groundtruth
+        The true trajectory, in any world.
+    align
+        The kind of motion between both worlds that is removed. Trajectories are aligned by their
+        positions, each by its own motion; objects by the whole poses of the estimate, see
+        ``object_alignment``.
+    rpe_delta, rpe_unit
+        Over what the relative pose error is taken, see ``relative_pose_error``.
+    objects, match, gate
+        The true objects and how to match them, see ``judge_objects``.
+    boxes
+        Boxes of known objects: the association is judged by them.
+    max_time_difference
+        Seconds between times that count as the same, by default half the interval of poses.
+    """
+    rows, true_rows = common_poses(results.timestamps, groundtruth, max_time_difference)
+    true_poses = groundtruth.world_from_camera[true_rows]
+
+    def judged(poses: Floats) -> tuple[dict[str, Any], dict[str, Any]]:
+        return judge_trajectory(
+            poses[rows], true_poses, align=align, rpe_delta=rpe_delta, rpe_unit=rpe_unit
+        )
+
+    ate, rpe = judged(results.world_from_camera)
+    odometry_ate, odometry_rpe = judged(results.odometry)
+    alignment = object_alignment(results, results.world_from_camera[rows], true_poses, align)
+    object_errors, association = None, None
+    if objects is not None:
+        object_errors = judge_objects(results.objects, objects, alignment, match=match, gate=gate)
+    if boxes is not None:
+        association = judge_association(results, boxes, max_time_difference=max_time_difference)
+    return {
+        "align": align,
+        "poses": len(rows),
+        "ate": ate,
+        "odometry_ate": odometry_ate,
+        "rpe": rpe,
+        "odometry_rpe": odometry_rpe,
+        "true_from_estimated": {
+            "rotation_xyzw": Rotation.from_matrix(alignment.rotation).as_quat(),
+            "translation": alignment.translation,
+            "scale": alignment.scale,
+        },
+        "objects": object_errors,
+        "reprojection_iou": judge_reprojection(results),
+        "association": association,
+    }
+
+
+def object_alignment(
+    results: Results, poses: Floats, true_poses: Floats, align: Align
+) -> Alignment:
+    """Return the motion that brings the map into the world of the truth.
+
+    It fits whole poses, (n, 7), with points as far ahead of them as objects are: the median of the
+    objects' least distances from the path. Positions alone leave the turn about a straight path
+    free.
+    """
+    path = results.world_from_camera[:, :3]
+    nearest = [np.linalg.norm(path - center, axis=1).min() for center in results.objects.center]
+    lever = float(np.median(nearest)) if nearest else 0.0
+    return align_poses(poses, true_poses, align, lever=lever if lever > 0.0 else 1.0)
