@@ -7,8 +7,8 @@ from typing import Any
 import typer
 
 from dqslam.cli.ablation import ablation
-from dqslam.cli.convert import convert
 from dqslam.cli.degeneracy import degeneracy
+from dqslam.cli.evaluate import evaluate
 from dqslam.cli.paper import paper
 from dqslam.cli.run import run
 
@@ -21,7 +21,7 @@ app = typer.Typer(
 )
 app.command()(paper)
 app.command()(run)
-app.command()(convert)
+app.command()(evaluate)
 app.command()(degeneracy)
 app.command()(ablation)
 
