@@ -38,6 +38,13 @@ def test_euroc_by_hand(tmp_path, more):
     np.testing.assert_allclose(poses, [TURN], atol=1e-15)
 
 
+def test_an_euroc_clock_that_starts_at_0_is_named(tmp_path):
+    path = write(tmp_path, EUROC.replace("1403636580838555648", "140363658"))
+    assert read_trajectory(path, "euroc").timestamps[0] == 0.140363658
+    with pytest.raises(FileError, match="trajectory in no known format"):  # a frame of MOT?
+        read_trajectory(path)
+
+
 def test_the_camera_in_the_body(tmp_path):
     # The camera sits 0.1 m ahead of the body on its x, which the turn makes y of the world.
     path = write(tmp_path, EUROC, "data.csv")
@@ -93,7 +100,6 @@ def test_matrices_come_back_to_a_billionth(tmp_path, name):
         (KITTI + KITTI.replace("3", "nan"), r":2: r34 is nan, not finite"),
         (KITTI + KITTI.replace("-1", "1"), r":2: the 3 x 3 part is no rotation .*determinant -1"),
         (KITTI.replace("-1", "-1.1"), r":1: the 3 x 3 part is no rotation \(R R' differs .* 0\.21"),
-        (EUROC.replace("1403636580838555648", "140363658"), None),
         (
             EUROC + "\n1.5e9" + EUROC[EUROC.index(",1,2") :],
             r":3: time is '1\.5e9', not a whole num",
@@ -105,9 +111,6 @@ def test_matrices_come_back_to_a_billionth(tmp_path, name):
 )
 def test_bad_lines_are_named(tmp_path, text, message):
     path = write(tmp_path, text)
-    if message is None:
-        assert read_trajectory(path).timestamps[0] == 0.140363658
-        return
     with pytest.raises(FileError, match=message):
         read_trajectory(path, frames=frame_rate(1))
 

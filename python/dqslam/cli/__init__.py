@@ -7,6 +7,7 @@ from typing import Any
 import typer
 
 from dqslam.cli.ablation import ablation
+from dqslam.cli.convert import convert
 from dqslam.cli.degeneracy import degeneracy
 from dqslam.cli.evaluate import evaluate
 from dqslam.cli.paper import paper
@@ -22,6 +23,7 @@ app = typer.Typer(
 app.command()(paper)
 app.command()(run)
 app.command()(evaluate)
+app.command()(convert)
 app.command()(degeneracy)
 app.command()(ablation)
 

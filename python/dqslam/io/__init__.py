@@ -2,6 +2,9 @@
 
 from dqslam.io.camera import CAMERA_FORMATS as CAMERA_FORMATS
 from dqslam.io.camera import read_camera as read_camera
+from dqslam.io.convert import ConvertContext as ConvertContext
+from dqslam.io.convert import Written as Written
+from dqslam.io.convert import convert as convert
 from dqslam.io.detections import DETECTION_FORMATS as DETECTION_FORMATS
 from dqslam.io.detections import DetectionTable as DetectionTable
 from dqslam.io.detections import read_class_names as read_class_names
@@ -11,6 +14,7 @@ from dqslam.io.files import write_json as write_json
 from dqslam.io.frames import FrameTimes as FrameTimes
 from dqslam.io.frames import frame_rate as frame_rate
 from dqslam.io.frames import read_frame_times as read_frame_times
+from dqslam.io.mount import read_mount as read_mount
 from dqslam.io.recording import Dropped as Dropped
 from dqslam.io.recording import OdometryNoise as OdometryNoise
 from dqslam.io.recording import load_recording as load_recording
@@ -22,6 +26,7 @@ from dqslam.io.results import load_results as load_results
 from dqslam.io.results import save_estimate as save_estimate
 from dqslam.io.sources import FormatNames as FormatNames
 from dqslam.io.sources import choose_frame_times as choose_frame_times
+from dqslam.io.sources import kind_of as kind_of
 from dqslam.io.sources import split_formats as split_formats
 from dqslam.io.trajectory import TRAJECTORY_FORMATS as TRAJECTORY_FORMATS
 from dqslam.io.trajectory import Trajectory as Trajectory

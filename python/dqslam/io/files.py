@@ -7,7 +7,7 @@ import json
 import math
 import os
 import shutil
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -103,15 +103,15 @@ def write_text(path: str | Path, parts: str | Iterable[str]) -> None:
             temporary.unlink(missing_ok=True)
 
 
-def write_folder(path: str | Path, files: Mapping[str, str | Iterable[str]]) -> None:
-    """Write a folder of files under a temporary name, then rename; what is there already stays."""
+@contextlib.contextmanager
+def whole_folder(path: str | Path) -> Iterator[Path]:
+    """Give a temporary folder that becomes ``path`` if all goes well; what is there stays."""
     path = Path(path)
     if path.exists() and not (path.is_dir() and not any(path.iterdir())):
         raise FileError(path, "is there already, and not empty")
     temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
-        for name, parts in files.items():
-            write_text(temporary / name, parts)
+        yield temporary
         temporary.replace(path)
     except OSError as error:
         raise FileError(path, f"cannot be written: {error.strerror}") from None

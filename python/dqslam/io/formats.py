@@ -36,7 +36,9 @@ class Format(Generic[Content]):
     recognise: Callable[[Look], bool]
     read: Callable[..., Content]
     write: Callable[..., None] | None = None
-    counts_frames: bool = False  #: it has no times, only numbers of frames
+    needs_times: bool = True  #: else a file may count frames, and have no times
+    has_times: Callable[[Path], bool] = lambda _: True  #: tells whether a file has them
+    endings: tuple[str, ...] = ()  #: of files that are written in it unless told otherwise
     loses: tuple[str, ...] = ()  #: what it has no place for
 
 
@@ -54,7 +56,7 @@ def choose_format(
     """
     if name is not None:
         return named_format(name, formats, kind)
-    look = _look(path)
+    look = look_at(path)
     for format_ in formats:
         if format_.recognise(look):
             return format_
@@ -75,7 +77,8 @@ def named_format(name: str, formats: Sequence[Format[Content]], kind: str) -> Fo
     raise ValueError(f"format {name!r} is none of {kind} formats: {known}")
 
 
-def _look(path: str | Path) -> Look:
+def look_at(path: str | Path) -> Look:
+    """Look at a file or folder that must be there."""
     path = Path(path)
     if not path.exists():
         raise FileError(path, "no such file")

@@ -6,6 +6,7 @@ describe itself are those of ROS 2 Humble and of vision_msgs 4.
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -53,8 +54,23 @@ def messages(path: str | Path, kind: str, topic: str | None) -> Iterator[tuple[s
     RuntimeError
         The package `rosbags` is missing.
     """
+    with _opened(path) as bag:
+        name = _topic(path, _topics(bag), kind, topic)
+        connections = [connection for connection in bag.connections if connection.topic == name]
+        for number, (connection, _, data) in enumerate(bag.messages(connections), start=1):
+            yield f"{name}, message {number}", bag.deserialize(data, connection.msgtype)
+
+
+def bag_topics(path: str | Path) -> dict[str, str]:
+    """Return the kind of message of each topic of a bag."""
+    with _opened(path) as bag:
+        return dict(_topics(bag))
+
+
+@contextlib.contextmanager
+def _opened(path: str | Path) -> Iterator[Any]:
     try:
-        from rosbags.highlevel import AnyReader, AnyReaderError
+        from rosbags.highlevel import AnyReader
     except ImportError:
         raise RuntimeError(
             f"{path}: bags are read with rosbags, which is missing: pip install 'dqslam[rosbag]'"
@@ -63,15 +79,16 @@ def messages(path: str | Path, kind: str, topic: str | None) -> Iterator[tuple[s
         raise FileError(path, "no such file")
     try:
         with AnyReader([Path(path)], default_typestore=_typestore()) as bag:
-            name = _topic(path, [(c.topic, c.msgtype) for c in bag.connections], kind, topic)
-            connections = [c for c in bag.connections if c.topic == name]
-            for number, (connection, _, data) in enumerate(bag.messages(connections), start=1):
-                where = f"{name}, message {number}"
-                yield where, bag.deserialize(data, connection.msgtype)
+            yield bag
     except FileError:
         raise
-    except AnyReaderError as error:
-        raise FileError(path, f"is no bag that can be read: {error}") from None
+    except Exception as error:
+        # A broken bag fails in rosbags, in sqlite or in a codec, and each has errors of its own.
+        raise FileError(path, f"is no bag that can be read: {error}") from error
+
+
+def _topics(bag: Any) -> list[tuple[str, str]]:
+    return [(connection.topic, connection.msgtype) for connection in bag.connections]
 
 
 def topic_option(format_name: str, topic: str | None) -> dict[str, str]:

@@ -8,8 +8,10 @@ from typing import NamedTuple
 
 from dqslam.io.camera import CAMERA_FORMATS
 from dqslam.io.detections import DETECTION_FORMATS
-from dqslam.io.formats import choose_format
+from dqslam.io.files import FileError, read_rows, read_text
+from dqslam.io.formats import choose_format, look_at
 from dqslam.io.frames import BY_NUMBER, FrameTimes, frame_rate, read_frame_times
+from dqslam.io.rosbag import looks_like_bag
 from dqslam.io.trajectory import TRAJECTORY_FORMATS
 
 
@@ -78,4 +80,24 @@ def choose_frame_times(
         return frame_rate(rate)
     path = choose_format(odometry, formats.trajectory, TRAJECTORY_FORMATS, "trajectory")
     boxes = choose_format(detections, formats.detections, DETECTION_FORMATS, "detections")
-    return BY_NUMBER if path.counts_frames and boxes.name != "rosbag" else None
+    return None if path.has_times(Path(odometry)) or boxes.name == "rosbag" else BY_NUMBER
+
+
+def kind_of(path: str | Path) -> str | None:
+    """Tell by its look whether a file is of a camera, a trajectory or detections; None of a bag."""
+    look = look_at(path)
+    if looks_like_bag(look):
+        return None
+    if look.suffix == ".json":
+        return "camera" if '"fx"' in read_text(path) else "detections"
+    for kind, formats in (
+        ("camera", CAMERA_FORMATS),
+        ("trajectory", TRAJECTORY_FORMATS),
+        ("detections", DETECTION_FORMATS),
+    ):
+        if any(format_.recognise(look) for format_ in formats):
+            return kind
+    if look.path.is_file():
+        read_rows(path)  # names what is wrong: empty, comments only, or no text
+    known = ", ".join(dict.fromkeys(name for names in KINDS.values() for name in names))
+    raise FileError(path, f"is in no known format; name it with --format: {known}")

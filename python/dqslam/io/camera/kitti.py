@@ -71,5 +71,4 @@ KITTI_CALIB = Format(
     _looks,
     read_kitti_calib,
     write_kitti_calib,
-    loses=("lens distortion",),
 )

@@ -131,4 +131,11 @@ def _looks(look: Look) -> bool:
     return look.suffix in (".yaml", ".yml") and look.path.is_file()
 
 
-ROS = Format("ros", "its name ends in .yaml or .yml", _looks, read_ros, write_ros)
+ROS = Format(
+    "ros",
+    "its name ends in .yaml or .yml",
+    _looks,
+    read_ros,
+    write_ros,
+    endings=(".yaml", ".yml"),
+)

@@ -125,7 +125,13 @@ JSON = Format(
     lambda look: look.suffix == ".json",
     read_json,
     write_json_camera,
+    endings=(".json",),
 )
 TOML = Format(
-    "toml", "its name ends in .toml", lambda look: look.suffix == ".toml", read_toml, write_toml
+    "toml",
+    "its name ends in .toml",
+    lambda look: look.suffix == ".toml",
+    read_toml,
+    write_toml,
+    endings=(".toml",),
 )

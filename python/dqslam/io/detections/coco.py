@@ -71,8 +71,8 @@ def read_coco(
     )
 
 
-def write_coco(path: str | Path, table: DetectionTable) -> None:
-    """Write boxes to a millionth of a pixel, one a line."""
+def write_coco(path: str | Path, table: DetectionTable, *, times: bool = True) -> None:
+    """Write boxes to a millionth of a pixel, one a line, with or without their times."""
     corner = table.box + CORNER
     size = corner[:, 2:] - corner[:, :2]
     boxes = np.round(np.hstack([corner[:, :2], size]), DIGITS).tolist()
@@ -84,8 +84,9 @@ def write_coco(path: str | Path, table: DetectionTable) -> None:
             "bbox": box,
             "score": round(float(table.score[row]), DIGITS),
             "category_name": table.class_name[row],
-            "timestamp": float(table.timestamp[row]),
         }
+        if times:
+            entry["timestamp"] = float(table.timestamp[row])
         if table.track_id is not None:
             entry["track_id"] = int(table.track_id[row])
         lines.append(json.dumps(entry, ensure_ascii=False))
@@ -154,4 +155,13 @@ def _looks(look: Look) -> bool:
     return look.suffix == ".json"
 
 
-COCO = Format("coco", "its name ends in .json", _looks, read_coco, write_coco, counts_frames=True)
+COCO = Format(
+    "coco",
+    "its name ends in .json",
+    _looks,
+    read_coco,
+    write_coco,
+    needs_times=False,
+    has_times=has_times,
+    endings=(".json",),
+)

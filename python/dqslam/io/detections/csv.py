@@ -115,5 +115,10 @@ def _looks(look: Look) -> bool:
 
 
 CSV = Format(
-    "csv", "its name ends in .csv, or its header has x1 and y1", _looks, read_csv, write_csv
+    "csv",
+    "its name ends in .csv, or its header has x1 and y1",
+    _looks,
+    read_csv,
+    write_csv,
+    endings=(".csv",),
 )

@@ -21,6 +21,7 @@ from dqslam.io.frames import FrameTimes
 FIELDS = ("frame", "id", "left", "top", "width", "height", "conf")
 WIDTHS = (7, 8, 9, 10)
 WITH_CLASS = 9
+LARGEST_FRAME = 1e9  #: what is larger is a time in nanoseconds
 FIRST = 1  #: number of the first frame and of the first pixel
 
 
@@ -66,8 +67,8 @@ def read_mot(
     )
 
 
-def write_mot(path: str | Path, table: DetectionTable) -> None:
-    """Write boxes with 9 columns, the class the 8th, visibility 1."""
+def write_mot(path: str | Path, table: DetectionTable, *, times: bool = True) -> None:
+    """Write boxes with 9 columns, the class the 8th, visibility 1; there is no place for times."""
     size = table.box[:, 2:] - table.box[:, :2]
     track = np.full(len(table), -1) if table.track_id is None else table.track_id
     boxes = np.hstack([table.box[:, :2] + FIRST, size]).tolist()
@@ -89,11 +90,11 @@ def write_mot(path: str | Path, table: DetectionTable) -> None:
 
 
 def _looks(look: Look) -> bool:
-    cells = look.first.split(",")
     try:
-        return len([float(cell) for cell in cells]) in WIDTHS
+        cells = [float(cell) for cell in look.first.split(",")]
     except ValueError:
         return False
+    return len(cells) in WIDTHS and cells[0] < LARGEST_FRAME
 
 
 MOT = Format(
@@ -102,6 +103,8 @@ MOT = Format(
     _looks,
     read_mot,
     write_mot,
-    counts_frames=True,
+    needs_times=False,
+    has_times=lambda _: False,
+    endings=(".txt",),
     loses=("times", "class names"),
 )

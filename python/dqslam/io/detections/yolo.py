@@ -20,7 +20,8 @@ from dqslam.io.files import (
     parse_numbers,
     read_rows,
     read_text,
-    write_folder,
+    whole_folder,
+    write_text,
 )
 from dqslam.io.formats import Format, Look
 from dqslam.io.frames import FrameTimes, frame_of, frame_table, read_frame_times
@@ -91,8 +92,10 @@ def read_yolo(
     )
 
 
-def write_yolo(path: str | Path, table: DetectionTable, *, width: int, height: int) -> None:
-    """Write a folder that is not there yet: boxes, classes.txt and frames.csv."""
+def write_yolo(
+    path: str | Path, table: DetectionTable, *, width: int, height: int, times: bool = True
+) -> None:
+    """Write a folder that is not there yet: boxes, classes.txt, and frames.csv with their times."""
     names = dict(zip(table.class_id.tolist(), table.class_name, strict=True))
     if min(names) < 0 or max(names) > LARGEST_CLASS:
         wrong = min(names) if min(names) < 0 else max(names)
@@ -107,8 +110,11 @@ def write_yolo(path: str | Path, table: DetectionTable, *, width: int, height: i
             line += f" {table.track_id[row]}"
         content.setdefault(f"{table.frame[row]:06d}.txt", []).append(line + "\n")
     content[CLASSES] = [names.get(i, str(i)) + "\n" for i in range(max(names) + 1)]
-    content[TIMES] = frame_table(table.frame, table.timestamp)
-    write_folder(path, content)
+    if times:
+        content[TIMES] = frame_table(table.frame, table.timestamp)
+    with whole_folder(path) as folder:
+        for name, lines in content.items():
+            write_text(folder / name, lines)
 
 
 def _read_rows(
@@ -164,4 +170,13 @@ def _looks(look: Look) -> bool:
     return look.path.is_dir() and bool(_box_files(look.path))
 
 
-YOLO = Format("yolo", "a folder of .txt files", _looks, read_yolo, write_yolo, counts_frames=True)
+YOLO = Format(
+    "yolo",
+    "a folder of .txt files",
+    _looks,
+    read_yolo,
+    write_yolo,
+    needs_times=False,
+    has_times=lambda path: (path / TIMES).is_file(),
+    endings=("",),
+)

@@ -22,6 +22,7 @@ from dqslam.io.trajectory.table import Trajectory, make_trajectory, parse_column
 FIELDS = ("p_x", "p_y", "p_z", "q_w", "q_x", "q_y", "q_z")
 HEADER = "#timestamp [ns]," + ",".join(FIELDS) + "\n"
 NANO = Decimal(10) ** 9
+SECOND = 10**9  #: what is smaller is no time in nanoseconds, but the number of a frame
 COMMONEST = (8, 17)  #: columns: the pose alone, and with velocity and biases
 
 
@@ -63,9 +64,14 @@ def _seconds(path: str | Path, cell: str, line: int) -> float:
 
 def _looks(look: Look) -> bool:
     cells = [cell.strip() for cell in look.first.split(",")]
-    return len(cells) in COMMONEST and cells[0].isdecimal()
+    return len(cells) in COMMONEST and cells[0].isdecimal() and int(cells[0]) >= SECOND
 
 
 EUROC = Format(
-    "euroc", "CSV of nanoseconds, position, quaternion w first", _looks, read_euroc, write_euroc
+    "euroc",
+    "CSV of nanoseconds, position, quaternion w first",
+    _looks,
+    read_euroc,
+    write_euroc,
+    endings=(".csv",),
 )

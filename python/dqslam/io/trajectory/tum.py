@@ -46,7 +46,16 @@ def write_tum(path: str | Path, timestamps: ArrayLike, world_from_camera: ArrayL
 
 
 def _looks(look: Look) -> bool:
-    return "," not in look.first and len(look.first.split()) == len(FIELDS)
+    fields = look.first.split()
+    # A camera of COLMAP may have 8 fields as well, the second its model.
+    return "," not in look.first and len(fields) == len(FIELDS) and not fields[1][0].isupper()
 
 
-TUM = Format("tum", "8 fields a line, t tx ty tz qx qy qz qw", _looks, read_tum, write_tum)
+TUM = Format(
+    "tum",
+    "8 fields a line, t tx ty tz qx qy qz qw",
+    _looks,
+    read_tum,
+    write_tum,
+    endings=(".txt", ".tum"),
+)

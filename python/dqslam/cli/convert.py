@@ -1,0 +1,71 @@
+"""``dqslam convert``: cameras, trajectories and detections from one format to another."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def convert(
+    source: Annotated[Path, typer.Argument(metavar="IN", help="A file, a folder of YOLO, a bag.")],
+    out: Annotated[Path, typer.Argument(metavar="OUT", help="What to write.")],
+    format_: Annotated[
+        str | None,
+        typer.Option("--format", metavar="NAME", help="Of IN. Default: told by its look."),
+    ] = None,
+    to: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Of OUT. Default: told by its ending.")
+    ] = None,
+    camera: Annotated[
+        Path | None, typer.Option(help="Its image size is what YOLO's boxes are shares of.")
+    ] = None,
+    frame_times: Annotated[
+        Path | None, typer.Option(help="Times of frames: KITTI times.txt, TUM rgb.txt, frames.csv.")
+    ] = None,
+    frame_rate: Annotated[
+        float | None, typer.Option(metavar="HZ", help="Or frames a second, frame 0 at 0 s.")
+    ] = None,
+    classes: Annotated[
+        Path | None,
+        typer.Option(help="Names of classes: COCO JSON, data.yaml, or a text of one a line."),
+    ] = None,
+    camera_in_body: Annotated[
+        Path | None,
+        typer.Option(
+            help="body_from_camera, of a trajectory that is the body's: 7, 12, 16 numbers."
+        ),
+    ] = None,
+    topic: Annotated[
+        list[str] | None, typer.Option(metavar="NAME", help="Of a bag with several; repeatable.")
+    ] = None,
+) -> None:
+    """Write a camera, a trajectory or detections in another format; a bag as a folder of all.
+
+    Formats: json toml ros colmap kitti-calib | tum kitti euroc | csv coco yolo mot | rosbag (read).
+    Times that OUT has no place for go into a file beside it.
+    """
+    from rich.console import Console
+
+    from dqslam import io
+
+    size = None
+    if camera is not None:
+        lens = io.read_camera(camera)
+        size = (lens.width, lens.height)
+    if frame_times is not None and frame_rate is not None:
+        raise ValueError("--frame-times and --frame-rate both say when a frame was taken")
+    frames = None if frame_times is None else io.read_frame_times(frame_times)
+    if frame_rate is not None:
+        frames = io.frame_rate(frame_rate)
+    context = io.ConvertContext(
+        size=size,
+        frames=frames,
+        classes=None if classes is None else io.read_class_names(classes),
+        body_from_camera=None if camera_in_body is None else io.read_mount(camera_in_body),
+    )
+    written = io.convert(source, out, format=format_, to=to, topics=topic or (), context=context)
+    console = Console()
+    for file in written:
+        loses = f"; no place for {' and '.join(file.loses)}" if file.loses else ""
+        text = f"wrote {file.path}: {file.what}{loses}"
+        console.print(text, markup=False, highlight=False, soft_wrap=True)

@@ -1,0 +1,229 @@
+"""From one format to another: nothing is cut, and what a format has no place for is said."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import ArrayLike
+
+from dqslam import _core
+from dqslam.io.camera import CAMERA_FORMATS, read_camera
+from dqslam.io.camera.rosbag import KIND as CAMERA_INFO
+from dqslam.io.detections import DETECTION_FORMATS, DetectionTable, read_detections
+from dqslam.io.detections.rosbag import KIND as DETECTION_ARRAY
+from dqslam.io.files import FileError, whole_folder
+from dqslam.io.formats import Format, choose_format
+from dqslam.io.frames import BY_NUMBER, FrameTimes, write_frame_times
+from dqslam.io.rosbag import NAME as BAG
+from dqslam.io.rosbag import bag_topics
+from dqslam.io.sources import KINDS, kind_of
+from dqslam.io.trajectory import TRAJECTORY_FORMATS, Trajectory, read_trajectory
+from dqslam.io.trajectory.rosbag import KIND as ODOMETRY
+
+FORMATS: dict[str, tuple[Format[Any], ...]] = {
+    "camera": CAMERA_FORMATS,
+    "trajectory": TRAJECTORY_FORMATS,
+    "detections": DETECTION_FORMATS,
+}
+# What a bag becomes, unless one kind is asked for.
+FROM_BAG = {
+    "camera": (CAMERA_INFO, "camera.json", "json"),
+    "trajectory": (ODOMETRY, "trajectory.txt", "tum"),
+    "detections": (DETECTION_ARRAY, "boxes.csv", "csv"),
+}
+
+
+@dataclass(frozen=True)
+class Written:
+    """A file that was written, what is in it, and what of the source it has no place for."""
+
+    path: Path
+    what: str
+    loses: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class ConvertContext:
+    """What the files themselves do not say; each is needed by some formats only."""
+
+    size: tuple[int, int] | None = None  #: of the image, width and height in px
+    frames: FrameTimes | None = None
+    classes: dict[int, str] | None = None
+    body_from_camera: ArrayLike | None = None
+
+
+def convert(
+    source: str | Path,
+    out: str | Path,
+    *,
+    format: str | None = None,
+    to: str | None = None,
+    topics: Sequence[str] = (),
+    context: ConvertContext | None = None,
+) -> list[Written]:
+    """Read one file and write it in another format, whole or not at all.
+
+    Parameters
+    ----------
+    source, out
+        Files, or folders. A bag becomes a folder of camera.json, trajectory.txt and boxes.csv, as
+        far as it has them, unless ``to`` names one format.
+    format, to
+        Names of formats; by default the source is told by its look, the target by its ending.
+    topics
+        Of a bag, where a kind has several.
+    context
+        Size of the image, times of frames, names of classes, mount of the camera.
+    """
+    source, out = Path(source), Path(out)
+    if out.exists() and source.exists() and out.samefile(source):
+        raise ValueError(f"{out}: the file would be written over itself")
+    context = context or ConvertContext()
+    kind = _kind(source, format, to)
+    if kind is not None:
+        target = _target(out, to, kind)
+        topic = _topics_by_kind(source, topics).get(kind) if topics else None
+        return _convert(source, out, kind, format, target, topic, context)
+    named = _topics_by_kind(source, topics)
+    there = set(bag_topics(source).values())
+    kinds = [kind for kind, (message, *_) in FROM_BAG.items() if message in there]
+    if not kinds:
+        known = ", ".join(message for message, *_ in FROM_BAG.values())
+        raise FileError(source, f"has no topic of {known}")
+    written: list[Written] = []
+    with whole_folder(out) as folder:
+        for kind in kinds:
+            _, name, target_name = FROM_BAG[kind]
+            target = choose_format(out, target_name, FORMATS[kind], kind)
+            more = _convert(source, folder / name, kind, BAG, target, named.get(kind), context)
+            written += [Written(out / one.path.name, one.what, one.loses) for one in more]
+    return written
+
+
+def _kind(source: Path, format_name: str | None, to: str | None) -> str | None:
+    """Tell what the source is: None for a bag of which all is wanted."""
+    for name, option in ((to, "--to"), (format_name, "--format")):
+        kinds = [kind for kind, known in KINDS.items() if name in known]
+        if name is not None and not kinds:
+            known = ", ".join(dict.fromkeys(name for names in KINDS.values() for name in names))
+            raise ValueError(f"{option}: format {name!r} is none of {known}")
+    if to == BAG:
+        raise ValueError("bags are read, not written")
+    by_target = next((kind for kind, known in KINDS.items() if to in known), None)
+    if format_name == BAG:
+        return by_target
+    if format_name is not None:
+        found = next(kind for kind, known in KINDS.items() if format_name in known)
+    else:
+        kind = kind_of(source)
+        if kind is None:
+            return by_target
+        found = kind
+    if to is not None and by_target != found:
+        raise ValueError(f"{source}: it is of {found}, which {to} is not")
+    return found
+
+
+def _target(out: Path, to: str | None, kind: str) -> Format[Any]:
+    if to is not None:
+        return choose_format(out, to, FORMATS[kind], kind)
+    for format_ in FORMATS[kind]:
+        if out.suffix.lower() in format_.endings:
+            return format_
+    known = ", ".join(format_.name for format_ in FORMATS[kind] if format_.write)
+    raise ValueError(f"{out}: its ending tells no format of {kind}; name one with --to: {known}")
+
+
+def _topics_by_kind(source: Path, topics: Sequence[str]) -> dict[str, str]:
+    messages = bag_topics(source)
+    found: dict[str, str] = {}
+    for topic in topics:
+        kinds = [kind for kind, (message, *_) in FROM_BAG.items() if messages.get(topic) == message]
+        if not kinds:
+            known = ", ".join(messages)
+            raise FileError(source, f"no topic {topic} that can be read (it has: {known})")
+        found[kinds[0]] = topic
+    return found
+
+
+def _convert(
+    source: Path,
+    out: Path,
+    kind: str,
+    format_name: str | None,
+    target: Format[Any],
+    topic: str | None,
+    context: ConvertContext,
+) -> list[Written]:
+    if kind == "camera":
+        camera = read_camera(source, format_name, topic=topic)
+        return _write_camera(out, camera, target)
+    origin = choose_format(source, format_name, FORMATS[kind], kind)
+    frames = context.frames
+    # Numbers of frames do where neither side has times.
+    timeless = frames is None and not origin.has_times(source)
+    if timeless and not target.needs_times:
+        frames = BY_NUMBER
+    if kind == "trajectory":
+        trajectory = read_trajectory(
+            source,
+            format_name,
+            frames=frames,
+            body_from_camera=context.body_from_camera,
+            topic=topic,
+        )
+        return _write_trajectory(out, trajectory, target, times=not timeless)
+    width, height = context.size or (None, None)
+    table = read_detections(
+        source,
+        format_name,
+        width=width,
+        height=height,
+        frames=frames,
+        classes=context.classes,
+        cut=False,
+        topic=topic,
+    )
+    return _write_detections(out, table, target, context, times=not timeless)
+
+
+def _write_camera(out: Path, camera: _core.Camera, target: Format[Any]) -> list[Written]:
+    assert target.write is not None
+    target.write(out, camera)
+    return [Written(out, f"camera of {camera.width} x {camera.height} px as {target.name}")]
+
+
+def _write_trajectory(
+    out: Path, trajectory: Trajectory, target: Format[Any], *, times: bool
+) -> list[Written]:
+    assert target.write is not None
+    target.write(out, *trajectory)
+    count = len(trajectory.timestamps)
+    written = [Written(out, f"{count} poses as {target.name}", target.loses)]
+    return written + (_beside(out, target, range(count), trajectory.timestamps) if times else [])
+
+
+def _write_detections(
+    out: Path, table: DetectionTable, target: Format[Any], context: ConvertContext, *, times: bool
+) -> list[Written]:
+    assert target.write is not None
+    options: dict[str, Any] = {} if target.name == "csv" else {"times": times}
+    if target.name == "yolo":
+        if context.size is None:
+            raise ValueError(f"{out}: yolo's boxes are shares of the image: give it with --camera")
+        options |= dict(zip(("width", "height"), context.size, strict=True))
+    target.write(out, table, **options)
+    written = [Written(out, f"{len(table)} boxes as {target.name}", target.loses)]
+    return written + (_beside(out, target, table.frame, table.timestamp) if times else [])
+
+
+def _beside(out: Path, target: Format[Any], frames: ArrayLike, times: ArrayLike) -> list[Written]:
+    """Keep the times beside a file that has no place for them."""
+    if "times" not in target.loses:
+        return []
+    path = out.with_name(f"{out.stem}.frames.csv")
+    write_frame_times(path, frames, times)
+    return [Written(path, "times of its frames, for --frame-times")]

@@ -1,0 +1,214 @@
+import json
+
+import numpy as np
+import pytest
+
+from dqslam.cli import main
+from dqslam.io import FileError, read_camera, read_detections, read_mount, read_trajectory
+
+CAMERA = {"fx": 500.5, "fy": 501, "cx": 320.25, "cy": 240, "width": 640, "height": 480}
+BOXES = """frame,timestamp,x1,y1,x2,y2,score,class_id,class_name,track_id
+0,100.5,449.24,314.81,501.57,377.39,0.9841,1,cup,4
+7,100.75,0.1,0.2,639,479.5,1,0,"jar, blue",-1
+"""
+PATH = """100.5 1.000000000 2.000000000 3.000000000 0.000000000 0.000000000 0.600000000 0.800000000
+100.75 4.000000000 5.000000000 6.000000000 1.000000000 0.000000000 0.000000000 0.000000000
+"""
+MOT = "1,-1,11,21,30,40,0.5,-1,-1,-1\n3,2,11,21,30,40,1,-1,-1,-1\n"
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "camera.json").write_text(json.dumps(CAMERA))
+    (tmp_path / "boxes.csv").write_text(BOXES)
+    (tmp_path / "traj.txt").write_text(PATH)
+    (tmp_path / "mot.txt").write_text(MOT)
+    return tmp_path
+
+
+@pytest.fixture
+def call(folder, monkeypatch, capsys):
+    monkeypatch.chdir(folder)
+
+    def run(line):
+        code = main(["convert", *line.split()])
+        shown = capsys.readouterr()
+        assert (code == 0) == (shown.err == "")
+        return shown.out if code == 0 else shown.err
+
+    return run
+
+
+@pytest.mark.parametrize(
+    ("out", "option"),
+    [
+        ("camera.toml", ""),
+        ("left.yaml", ""),
+        ("cameras.txt", "--to colmap"),
+        ("c.txt", "--to kitti-calib"),
+    ],
+)
+def test_cameras_there_and_back(folder, call, out, option):
+    shown = call(f"camera.json {out} {option}")
+    assert shown.startswith(f"wrote {out}: camera of 640 x 480 px as ")
+    call(f"{out} back.json")
+    back = read_camera(folder / "back.json")
+    assert {name: getattr(back, name) for name in CAMERA} == CAMERA
+
+
+@pytest.mark.parametrize(
+    ("there", "back"),
+    [
+        ("boxes.json", ""),
+        ("labels --to yolo --camera camera.json", "--camera camera.json"),
+        ("boxes.txt --to mot", "--frame-times boxes.frames.csv --classes names.txt"),
+    ],
+)
+def test_boxes_there_and_back_to_the_digit(folder, call, there, back):
+    (folder / "names.txt").write_text("jar, blue\ncup\n")
+    shown = call(f"boxes.csv {there}")
+    assert f"wrote {there.split()[0]}: 2 boxes as " in shown
+    call(f"{there.split()[0]} back.csv {back}")
+    assert (folder / "back.csv").read_text() == BOXES
+
+
+@pytest.mark.parametrize(
+    ("there", "back"),
+    [("data.csv", ""), ("poses.txt --to kitti", "--frame-times poses.frames.csv")],
+)
+def test_trajectories_there_and_back_to_the_digit(folder, call, there, back):
+    call(f"traj.txt {there}")
+    call(f"{there.split()[0]} back.txt --to tum {back}")
+    assert (folder / "back.txt").read_text() == PATH
+
+
+def test_what_is_lost_is_said_and_times_are_kept_beside(folder, call):
+    lines = call("boxes.csv boxes.txt").splitlines()
+    assert lines == [
+        "wrote boxes.txt: 2 boxes as mot; no place for times and class names",
+        "wrote boxes.frames.csv: times of its frames, for --frame-times",
+    ]
+    assert (folder / "boxes.frames.csv").read_text() == "frame,timestamp\n0,100.5\n7,100.75\n"
+
+
+def test_formats_without_times_need_none_between_them(folder, call):
+    call("mot.txt boxes.json")
+    entries = json.loads((folder / "boxes.json").read_text())
+    assert [entry["image_id"] for entry in entries] == [0, 2]
+    assert "timestamp" not in entries[0]
+    call("mot.txt labels --camera camera.json")
+    names = sorted(path.name for path in (folder / "labels").iterdir())
+    assert names == ["000000.txt", "000002.txt", "classes.txt"]
+    call("boxes.json again.txt")
+    rows = np.loadtxt(folder / "again.txt", delimiter=",")
+    np.testing.assert_array_equal(rows[:, :7], np.loadtxt(folder / "mot.txt", delimiter=",")[:, :7])
+    assert not (folder / "again.frames.csv").exists()
+
+
+def test_frame_rate(folder, call):
+    call("mot.txt out.csv --frame-rate 10")
+    assert read_detections(folder / "out.csv").timestamp.tolist() == [0, 0.2]
+
+
+def test_nothing_is_cut(folder, call):
+    (folder / "mot.txt").write_text("1,-1,-99,21,1030,40,0.5,-1,-1,-1\n")
+    call("mot.txt out.csv --frame-rate 10 --camera camera.json")
+    np.testing.assert_array_equal(read_detections(folder / "out.csv").box, [[-100, 20, 930, 60]])
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("mount.txt", "0.1 0 0 0 0 0 1\n"),
+        ("mount.txt", "[[1, 0, 0, 0.1],\n [0, 1, 0, 0],\n [0, 0, 1, 0]]\n"),
+        ("sensor.yaml", "T_BS:\n  rows: 4\n  data: [1, 0, 0, 0.1, 0,1,0,0, 0,0,1,0, 0,0,0,1]\n"),
+    ],
+)
+def test_the_camera_in_the_body(folder, call, name, text):
+    (folder / name).write_text(text)
+    call(f"traj.txt out.txt --camera-in-body {name}")
+    # A turn of 0.6, 0.8 about z takes x to (0.28, 0.96).
+    poses = read_trajectory(folder / "out.txt").world_from_camera
+    np.testing.assert_allclose(poses[0, :3], [1.028, 2.096, 3], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("1 2 3", "m.txt: holds 3 numbers, not 7, 12 or 16"),
+        ("0 0 0 0 0 0 2", "m.txt: quaternion has length 2, not 1"),
+        ("1 0 0 0 0 1 0 0 0 0 -1 0", "m.txt: is no rotation and translation"),
+        ("0 0 0\n0 0 x 1", "m.txt:2: a number is 'x', not a number"),
+    ],
+)
+def test_bad_mounts(tmp_path, text, message):
+    (tmp_path / "m.txt").write_text(text)
+    with pytest.raises(FileError, match=message):
+        read_mount(tmp_path / "m.txt")
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("none.csv out.json", "none.csv: no such file"),
+        (
+            "boxes.csv out.dat",
+            "out.dat: its ending tells no format of detections",
+        ),
+        ("boxes.csv out.json --to tum", "boxes.csv: it is of detections, which tum is not"),
+        ("boxes.csv out.json --to bvh", "--to: format 'bvh' is none of rosbag, json, toml"),
+        ("boxes.csv out.json --format bvh", "--format: format 'bvh' is none of rosbag"),
+        ("boxes.csv out --to rosbag", "bags are read, not written"),
+        ("boxes.csv out --to yolo", "out: yolo's boxes are shares of the image"),
+        ("boxes.csv boxes.csv", "boxes.csv: the file would be written over itself"),
+        (
+            "mot.txt out.csv",
+            "mot has no times: say them with --frame-times",
+        ),
+        ("mot.txt out.csv --frame-rate 0", "frame rate is 0 Hz, not positive"),
+        ("mot.txt out.csv --frame-rate 1 --frame-times x", "both say when a frame was taken"),
+        ("bad.csv out.json", "bad.csv:3: x1 is nan, not finite"),
+        ("empty.csv out.json", "empty.csv: is empty"),
+        ("notes.md out.json", "notes.md: is in no known format; name it with --format"),
+        ("void out.json", "void: is in no known format"),
+        ("camera.json out.txt --to tum", "camera.json: it is of camera, which tum is not"),
+    ],
+)
+def test_bad_input_is_one_line_and_leaves_nothing(folder, call, line, message):
+    (folder / "bad.csv").write_text(BOXES.replace("7,100.75,0.1", "7,100.75,nan"))
+    (folder / "empty.csv").write_text("")
+    (folder / "notes.md").write_text("# notes\nhello\n")
+    (folder / "void").mkdir()
+    before = sorted(folder.rglob("*"))
+    shown = call(line)
+    assert message in shown
+    assert shown.count("\n") == 1
+    assert sorted(folder.rglob("*")) == before
+
+
+def test_a_bag_becomes_a_folder(folder, call):
+    pytest.importorskip("rosbags", reason="rosbags is not installed")
+    from test_io_rosbag import CUP, ODOMETRY, Bag
+
+    bag = Bag()
+    path = [bag.odometry(*row) for row in ODOMETRY]
+    topics = {"/odom": path, "/boxes": [bag.boxes(100.25, CUP)], "/info": [bag.camera()]}
+    bag.write(folder / "bag", topics)
+    assert call("bag out").splitlines() == [
+        "wrote out/camera.json: camera of 640 x 480 px as json",
+        "wrote out/trajectory.txt: 2 poses as tum",
+        "wrote out/boxes.csv: 1 boxes as csv",
+    ]
+    assert sorted(file.name for file in (folder / "out").iterdir()) == [
+        "boxes.csv",
+        "camera.json",
+        "trajectory.txt",
+    ]
+    assert "no place" not in call("bag alone.txt --to tum")
+    assert (folder / "alone.txt").read_text() == (folder / "out/trajectory.txt").read_text()
+    assert "out: is there already, and not empty" in call("bag out")
+    bag.write(folder / "two", {"/a": path, "/b": path[1:], "/boxes": topics["/boxes"]})
+    assert "has topics /a, /b: name one with --topic" in call("two twice")
+    assert not (folder / "twice").exists()
+    assert "1 poses as tum" in call("two twice --topic /b")
+    assert "no topic /c that can be read (it has: /a, /b, /boxes)" in call("two third --topic /c")
