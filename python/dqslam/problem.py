@@ -37,8 +37,10 @@ class BoxNoise:
 
 # Two boxes do not tell an object's distance from its size.
 FEWEST_INLIER_VIEWS = 3
-# A few boxes fit some ellipsoid even if all of them are other objects'.
-LEAST_INLIER_SHARE = 1.0 / 3.0
+# A few boxes fit some ellipsoid even if all of them are other objects': so many of them must, or
+# that share of all. Many may fit where a small share does, at one of the places of a moved object.
+ENOUGH_INLIERS = 6
+ENOUGH_INLIER_SHARE = 1.0 / 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,16 +158,16 @@ def _unfit(graph: Graph, inliers: Bools) -> dict[int, str]:
     """Say by id which objects too few boxes fit, and how few."""
     views = _inlier_views(graph.core, inliers)
     fit = np.bincount(graph.core.box_object[inliers], minlength=len(views))
+    needed = np.ceil(np.minimum(ENOUGH_INLIERS, ENOUGH_INLIER_SHARE * graph.observations))
     reasons = {}
     for row, object_id in enumerate(graph.object_ids.tolist()):
         if views[row] < FEWEST_INLIER_VIEWS:
             reasons[object_id] = (
                 f"seen in {views[row]} poses by boxes that fit, {FEWEST_INLIER_VIEWS} are needed"
             )
-        elif fit[row] < LEAST_INLIER_SHARE * graph.observations[row]:
+        elif fit[row] < needed[row]:
             reasons[object_id] = (
-                f"{fit[row]} of {graph.observations[row]} boxes fit, "
-                f"{LEAST_INLIER_SHARE:.0%} are needed"
+                f"{fit[row]} of {graph.observations[row]} boxes fit, {needed[row]:.0f} are needed"
             )
     return reasons
 
