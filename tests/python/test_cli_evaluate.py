@@ -1,4 +1,5 @@
 import json
+from pathlib import Path
 
 import pytest
 
@@ -40,6 +41,26 @@ def test_tables_and_file(files, capsys):
     assert "3 matched, 2 missed, 1 invented, by distance and class; 1 in the map move" in text
     assert "5 found, 1 missed, 0 split, 0 invented" in text
     assert "recall 1" in text
+
+
+def keys(content):
+    """Yield all keys, at any depth."""
+    if isinstance(content, dict):
+        for key, value in content.items():
+            yield key
+            yield from keys(value)
+    elif isinstance(content, list):
+        for value in content:
+            yield from keys(value)
+
+
+def test_the_documentation_has_every_key(files):
+    options = ("--objects", files.objects, "--boxes", files.boxes, "--align", "sim3")
+    assert call(files, *options) == 0
+    written = json.loads((files.results / "evaluation.json").read_text())
+    page = (Path(__file__).parents[2] / "docs" / "evaluation.md").read_text()
+    table = page[page.index("## `evaluation.json`") :]
+    assert {key for key in keys(written) if f"`{key}`" not in table} == set()
 
 
 def test_json_is_the_file(files, capsys):

@@ -42,9 +42,25 @@ def test_trajectories(files):
     assert found["odometry_rpe"]["rotation_deg"]["max"] == pytest.approx(0.0, abs=1e-4)
     assert found["odometry_ate"]["rmse"] > 0.05
     motion = found["true_from_estimated"]
+    assert motion["by"] == "poses"
     np.testing.assert_allclose(motion["translation"], planted.SHIFT, atol=1e-7)
     turned = Rotation.from_quat(motion["rotation_xyzw"]) * planted.TURN.inv()
     assert turned.magnitude() == pytest.approx(0.0, abs=1e-7)
+
+
+@pytest.mark.parametrize("axis", np.eye(3))
+def test_a_truth_of_a_body_that_looks_elsewhere(files, axis):
+    """Its positions are right, its orientations are not the camera's: they are left aside."""
+    truth = read_trajectory(files.groundtruth)
+    turns = Rotation.from_quat(truth.world_from_camera[:, 3:]) * Rotation.from_rotvec(1.5 * axis)
+    poses = np.hstack([truth.world_from_camera[:, :3], turns.as_quat()])
+    objects = io.read_true_objects(files.objects)
+    body = Trajectory(truth.timestamps, poses)
+    found = evaluate_results(io.load_results(files.results), body, objects=objects)
+    assert found["true_from_estimated"]["by"] == "positions"
+    assert found["ate"]["max"] == pytest.approx(0.0, abs=1e-7)
+    first = check_objects(found["objects"])
+    assert first["center"] == pytest.approx(planted.CENTER_ERROR, abs=1e-6)
 
 
 def test_without_alignment_the_world_counts(files):

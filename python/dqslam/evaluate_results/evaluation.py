@@ -8,11 +8,14 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from dqslam._checks import Floats
-from dqslam.evaluate import Align, Alignment, align_poses
+from dqslam.evaluate import Align, Alignment, align_poses, align_positions
 from dqslam.evaluate_results.boxes import judge_association, judge_reprojection
 from dqslam.evaluate_results.objects import Match, judge_objects
 from dqslam.evaluate_results.trajectory import common_poses, judge_trajectory
 from dqslam.io import Results, Trajectory, TrueBoxes, TrueObjects
+
+# Where orientations differ by more, radians, they are not of the same thing.
+LARGEST_TURN = np.radians(20.0)
 
 
 def evaluate_results(
@@ -57,7 +60,7 @@ def evaluate_results(
 
     ate, rpe = judged(results.world_from_camera)
     odometry_ate, odometry_rpe = judged(results.odometry)
-    alignment = object_alignment(results, results.world_from_camera[rows], true_poses, align)
+    alignment, by = object_alignment(results, results.world_from_camera[rows], true_poses, align)
     object_errors, association = None, None
     if objects is not None:
         object_errors = judge_objects(results.objects, objects, alignment, match=match, gate=gate)
@@ -71,6 +74,7 @@ def evaluate_results(
         "rpe": rpe,
         "odometry_rpe": odometry_rpe,
         "true_from_estimated": {
+            "by": by,
             "rotation_xyzw": Rotation.from_matrix(alignment.rotation).as_quat(),
             "translation": alignment.translation,
             "scale": alignment.scale,
@@ -83,14 +87,21 @@ def evaluate_results(
 
 def object_alignment(
     results: Results, poses: Floats, true_poses: Floats, align: Align
-) -> Alignment:
-    """Return the motion that brings the map into the world of the truth.
+) -> tuple[Alignment, Literal["poses", "positions"]]:
+    """Return the motion that brings the map into the world of the truth, and what it is found by.
 
     It fits whole poses, (n, 7), with points as far ahead of them as objects are: the median of the
     objects' least distances from the path. Positions alone leave the turn about a straight path
-    free.
+    free. They have to do where the poses do not agree, as with the pose of a body that looks
+    elsewhere than the camera.
     """
     path = results.world_from_camera[:, :3]
     nearest = [np.linalg.norm(path - center, axis=1).min() for center in results.objects.center]
     lever = float(np.median(nearest)) if nearest else 0.0
-    return align_poses(poses, true_poses, align, lever=lever if lever > 0.0 else 1.0)
+    found = align_poses(poses, true_poses, align, lever=lever if lever > 0.0 else 1.0)
+    turns, true_turns = (
+        Rotation.from_quat(given[:, 3:]) for given in (found.apply_poses(poses), true_poses)
+    )
+    if align == "none" or np.median((true_turns.inv() * turns).magnitude()) < LARGEST_TURN:
+        return found, "poses"
+    return align_positions(poses[:, :3], true_poses[:, :3], align), "positions"
