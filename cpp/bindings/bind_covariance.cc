@@ -37,18 +37,21 @@ void BindCovariance(py::module_& m) {
         py::call_guard<py::gil_scoped_release>(),
         "Joint covariance of some poses (k rows each), then objects (9 rows each).");
 
-  py::class_<OdometryFit>(m, "OdometryFit", "How well the odometry fits an estimate.")
-      .def_readonly("residuals", &OdometryFit::residuals, "In sigmas, shape (n, k).")
-      .def_readonly("leverage",
-                    &OdometryFit::leverage,
-                    "0..1, shape (n, k): 1 where the edge alone determines what it measures.");
-  m.def("odometry_fit",
-        &ComputeOdometryFit,
+  py::class_<Fit>(m, "Fit", "How well measurements fit an estimate.")
+      .def_readonly(
+          "odometry_residuals", &Fit::odometry_residuals, "In sigmas, shape (n, k), one row a step.")
+      .def_readonly("odometry_leverage",
+                    &Fit::odometry_leverage,
+                    "0..1, shape (n, k): 1 where the step alone determines what it measures.")
+      .def_readonly("box_squares", &Fit::box_squares, "Sum over all edges of boxes, in sigmas.")
+      .def_readonly("box_redundancy", &Fit::box_redundancy, "Sum of 1 - leverage over them.");
+  m.def("fit",
+        &ComputeFit,
         "graph"_a,
         "options"_a,
         "state"_a,
         py::call_guard<py::gil_scoped_release>(),
-        "Residuals and leverage of the odometry: what variance components are estimated from.");
+        "Residuals and leverage of odometry and boxes: what variance components come from.");
 }
 
 }  // namespace dqslam

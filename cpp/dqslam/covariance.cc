@@ -13,6 +13,19 @@ namespace {
 // A variance this many times the one that it would have if all else were known comes from rounding.
 constexpr double kUndetermined = 1e9;
 
+using RowMajorSparse = Eigen::SparseMatrix<double, Eigen::RowMajor>;
+
+// Variance of a residual as the estimate predicts it: its row of J H^-1 J^T.
+double Leverage(const RowMajorSparse& J, int row, const SelectedInverse& inverse) {
+  double leverage = 0;
+  for (RowMajorSparse::InnerIterator a(J, row); a; ++a) {
+    for (RowMajorSparse::InnerIterator b(J, row); b; ++b) {
+      leverage += a.value() * inverse(a.col(), b.col()) * b.value();
+    }
+  }
+  return leverage;
+}
+
 // Columns of some blocks of the information matrix; none of a fixed pose.
 std::vector<int> ColumnsOf(const Information& information,
                            const Graph& graph,
@@ -95,30 +108,29 @@ RowMatrix ComputeJointCovariance(const Graph& graph,
   return joint;
 }
 
-OdometryFit ComputeOdometryFit(const Graph& graph,
-                               const SolveOptions& options,
-                               const State& state) {
+Fit ComputeFit(const Graph& graph, const SolveOptions& options, const State& state) {
   const Information information = ComputeInformation(graph, options, state);
   const SelectedInverse inverse(Damped(information.matrix));
-  const Eigen::SparseMatrix<double, Eigen::RowMajor> J = information.jacobian;
+  const RowMajorSparse J = information.jacobian;
 
   const int k = graph.tangent_size();
-  OdometryFit fit;
-  fit.residuals = RowMatrix::Zero(graph.odometry.size(), k);
-  fit.leverage = RowMatrix::Zero(graph.odometry.size(), k);
+  Fit fit;
+  fit.odometry_residuals = RowMatrix::Zero(graph.odometry.size(), k);
+  fit.odometry_leverage = RowMatrix::Zero(graph.odometry.size(), k);
   int row = 0;
   for (int edge = 0; edge < graph.odometry.size(); ++edge) {
     const int later = std::max(graph.odometry.from[edge], graph.odometry.to[edge]);
     if (later < information.first_free_pose) continue;
     for (int i = 0; i < k; ++i, ++row) {
-      fit.residuals(edge, i) = information.residuals[row];
-      using Entry = Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator;
-      for (Entry a(J, row); a; ++a) {
-        for (Entry b(J, row); b; ++b) {
-          fit.leverage(edge, i) += a.value() * inverse(a.col(), b.col()) * b.value();
-        }
-      }
+      fit.odometry_residuals(edge, i) = information.residuals[row];
+      fit.odometry_leverage(edge, i) = Leverage(J, row, inverse);
     }
+  }
+  for (const int end = row + 4 * information.num_boxes; row < end; ++row) {
+    const double leverage = Leverage(J, row, inverse);
+    if (leverage == 0) continue;  // an edge that the image cut, and the object reaches it
+    fit.box_squares += information.residuals[row] * information.residuals[row];
+    fit.box_redundancy += 1 - leverage;
   }
   return fit;
 }

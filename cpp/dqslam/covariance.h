@@ -32,12 +32,16 @@ RowMatrix ComputeJointCovariance(const Graph& graph,
                                  const std::vector<int>& poses,
                                  const std::vector<int>& objects);
 
-/// How well the odometry fits the estimate: what variance components are estimated from.
-struct OdometryFit {
-  RowMatrix residuals;  ///< (edges, k) in sigmas
-  RowMatrix leverage;   ///< (edges, k) 0..1: 1 where the edge alone determines what it measures
+/// How well measurements fit the estimate, by groups: what variance components are estimated from.
+/// Leverage is 1 where a measurement alone determines what it measures, 0 where the others do; a
+/// squared residual is 1 - leverage in the mean.
+struct Fit {
+  RowMatrix odometry_residuals;  ///< (edges, k) in sigmas
+  RowMatrix odometry_leverage;   ///< (edges, k)
+  double box_squares = 0;        ///< sum of squared residuals of all box edges, in sigmas
+  double box_redundancy = 0;     ///< sum of 1 - leverage, of the edges that constrain anything
 };
 
-OdometryFit ComputeOdometryFit(const Graph& graph, const SolveOptions& options, const State& state);
+Fit ComputeFit(const Graph& graph, const SolveOptions& options, const State& state);
 
 }  // namespace dqslam

@@ -3,6 +3,7 @@
 #include <ceres/crs_matrix.h>
 #include <ceres/problem.h>
 
+#include <algorithm>
 #include <numeric>
 #include <stdexcept>
 
@@ -66,6 +67,9 @@ Information ComputeInformation(const Graph& graph, const SolveOptions& options, 
   Information information;
   information.first_free_pose = stage.first_free_pose;
   information.num_free_poses = graph.num_poses() - stage.first_free_pose;
+  information.num_boxes =
+      graph.boxes.size() -
+      static_cast<int>(std::count(stage.weights.begin(), stage.weights.end(), 0.0));
   ceres::Problem::EvaluateOptions evaluate;
   for (int pose = stage.first_free_pose; pose < graph.num_poses(); ++pose) {
     evaluate.parameter_blocks.push_back(state.poses.row(pose).data());

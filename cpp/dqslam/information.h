@@ -11,12 +11,13 @@ namespace dqslam {
 
 /// Columns: the tangents of the free poses in their order, then the parameters of all objects.
 struct Information {
-  Eigen::SparseMatrix<double> jacobian;  ///< of the residuals, in sigmas; odometry's come first
+  Eigen::SparseMatrix<double> jacobian;  ///< of the residuals, in sigmas; of odometry, then boxes, then the rest
   Eigen::SparseMatrix<double> matrix;    ///< H
   Eigen::VectorXd residuals;
   std::vector<int> block_sizes;  ///< of the free poses and the objects
   int first_free_pose = 1;
   int num_free_poses = 0;
+  int num_boxes = 0;  ///< that take part
 
   /// Column at which the block of a free pose or of an object starts.
   int PoseColumn(int pose) const;

@@ -14,12 +14,12 @@ import numpy.typing
 __all__: list[str] = [
     "Camera",
     "Covariance",
+    "Fit",
     "Graph",
     "LandmarkModel",
     "Loss",
     "Minimizer",
     "Mode",
-    "OdometryFit",
     "PoseModel",
     "Residual",
     "ScenePriors",
@@ -38,9 +38,9 @@ __all__: list[str] = [
     "dual_quadric_matrix",
     "ellipsoid_from_axes",
     "ellipsoid_from_dual_quadric",
+    "fit",
     "joint_covariance",
     "minus",
-    "odometry_fit",
     "plus",
     "project_to_boxes",
     "solve",
@@ -550,19 +550,29 @@ class Covariance:
         One sentence for each pose or object that nothing determines.
         """
 
-class OdometryFit:
+class Fit:
     """
-    How well the odometry fits an estimate.
+    How well measurements fit an estimate.
     """
     @property
-    def leverage(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+    def box_redundancy(self) -> float:
         """
-        0..1, shape (n, k): 1 where the edge alone determines what it measures.
+        Sum of 1 - leverage over them.
         """
     @property
-    def residuals(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+    def box_squares(self) -> float:
         """
-        In sigmas, shape (n, k).
+        Sum over all edges of boxes, in sigmas.
+        """
+    @property
+    def odometry_leverage(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        0..1, shape (n, k): 1 where the step alone determines what it measures.
+        """
+    @property
+    def odometry_residuals(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        In sigmas, shape (n, k), one row a step.
         """
 
 def axes_from_ellipsoid(
@@ -638,6 +648,11 @@ def ellipsoid_from_dual_quadric(
     Log-Cholesky parameters (9,) of q1 .. q9; ValueError when q is no ellipsoid.
     """
 
+def fit(graph: Graph, options: SolveOptions, state: State) -> Fit:
+    """
+    Residuals and leverage of odometry and boxes: what variance components come from.
+    """
+
 def joint_covariance(
     graph: Graph,
     options: SolveOptions,
@@ -656,11 +671,6 @@ def minus(
 ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
     """
     Tangents (n, k) that move the origins to the poses.
-    """
-
-def odometry_fit(graph: Graph, options: SolveOptions, state: State) -> OdometryFit:
-    """
-    Residuals and leverage of the odometry: what variance components are estimated from.
     """
 
 def plus(

@@ -111,27 +111,27 @@ TEST(ComputeJointCovariance, HasTheMarginalsOnItsDiagonal) {
                std::invalid_argument);
 }
 
-TEST(ComputeOdometryFit, OdometryAloneFitsPerfectly) {
+TEST(ComputeFit, OdometryAloneFitsPerfectly) {
   Scene scene = MakeScene<Se2>();
   scene.graph.boxes = {
       IndexVector(0), IndexVector(0), RowMatrix(0, 4), RowMatrix(0, 16), BoolTable(0, 4)};
   scene.graph.size_prior = {Eigen::VectorXd(0), Eigen::VectorXd(0)};
   const State state{scene.truth.poses, RowMatrix(0, kLandmarkSize)};
-  const OdometryFit fit = ComputeOdometryFit(scene.graph, SolveOptions(), state);
-  EXPECT_LT(fit.residuals.cwiseAbs().maxCoeff(), 1e-9);
-  EXPECT_LT((fit.leverage.array() - 1).abs().maxCoeff(), 1e-6);
+  const Fit fit = ComputeFit(scene.graph, SolveOptions(), state);
+  EXPECT_LT(fit.odometry_residuals.cwiseAbs().maxCoeff(), 1e-9);
+  EXPECT_LT((fit.odometry_leverage.array() - 1).abs().maxCoeff(), 1e-6);
 }
 
 // The squared residual of a measurement is 1 - leverage in the mean: what variance components
 // are estimated by.
-TEST(ComputeOdometryFit, LeverageTellsTheMeanSquaredResidual) {
+TEST(ComputeFit, LeverageTellsTheMeanSquaredResidual) {
   constexpr int kRuns = 40;
   Scene scene = MakeScene<Se2>();
   const OdometryTable exact = scene.graph.odometry;
   const RowMatrix boxes = scene.graph.boxes.box;
   SolveOptions options;
   Random random(5);
-  double squares = 0, redundancy = 0;
+  double squares = 0, redundancy = 0, box_squares = 0, box_redundancy = 0;
   for (int run = 0; run < kRuns; ++run) {
     for (int edge = 0; edge < exact.size(); ++edge) {
       const Eigen::Vector3d noise = 0.02 * Eigen::Vector3d::NullaryExpr([&](Eigen::Index) {
@@ -147,12 +147,16 @@ TEST(ComputeOdometryFit, LeverageTellsTheMeanSquaredResidual) {
     }
     const Solution solution = Solve(scene.graph, options, scene.truth);
     const State state{solution.poses, solution.landmarks};
-    const OdometryFit fit = ComputeOdometryFit(scene.graph, options, state);
-    squares += fit.residuals.squaredNorm();
-    redundancy += (1 - fit.leverage.array()).sum();
+    const Fit fit = ComputeFit(scene.graph, options, state);
+    squares += fit.odometry_residuals.squaredNorm();
+    redundancy += (1 - fit.odometry_leverage.array()).sum();
+    box_squares += fit.box_squares;
+    box_redundancy += fit.box_redundancy;
   }
   EXPECT_GT(redundancy, 500);
   EXPECT_NEAR(squares / redundancy, 1, 0.15);  // 4 sigmas of a chi-square of 1400
+  EXPECT_GT(box_redundancy, 10000);
+  EXPECT_NEAR(box_squares / box_redundancy, 1, 0.04);
 }
 
 TEST(ComputeCovariance, RefusesAStateThatDoesNotFit) {
