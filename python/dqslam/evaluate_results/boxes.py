@@ -57,8 +57,8 @@ def judge_association(
 ) -> dict[str, Any]:
     """Judge which object each box was taken for by the true box it overlaps.
 
-    Only boxes from poses for which the truth has a box: elsewhere nobody may have looked. Boxes
-    that were held out do not count.
+    Only boxes from poses for which the truth has a box: elsewhere nobody may have looked. Nor are
+    those judged that overlap a true box without an id, or that were held out.
 
     Parameters
     ----------
@@ -84,4 +84,6 @@ def judge_association(
     pose, box = boxes.pose[judged], boxes.box[judged]
     match = match_boxes(pose, box, true_pose, true_boxes, min_iou=min_iou)
     shown = np.where(match >= 0, true_id[match], -1)
-    return {"min_iou": min_iou, **asdict(score_association(pose, boxes.object_id[judged], shown))}
+    known = (match < 0) | (shown >= 0)
+    score = score_association(pose[known], boxes.object_id[judged][known], shown[known])
+    return {"min_iou": min_iou, **asdict(score)}

@@ -78,7 +78,7 @@ class TrueBoxes:
     box: Floats
     """[u_min, v_min, u_max, v_max] in undistorted pixels, shape (t, 4)."""
     object_id: Ints
-    """Which object it shows, -1 for none; shape (t,)."""
+    """Which object it shows, -1 where that is unknown; shape (t,)."""
 
 
 def read_true_objects(path: str | Path) -> TrueObjects:
@@ -109,7 +109,7 @@ def read_true_objects(path: str | Path) -> TrueObjects:
 def read_true_boxes(
     path: str | Path, camera: _core.Camera, id_column: str = "track_id"
 ) -> TrueBoxes:
-    """Read the boxes of known objects, and undistort them; an empty id is that of no object."""
+    """Read the boxes of known objects, and undistort them; an empty id is unknown, -1."""
     table = read_csv(path, required=("timestamp", *EDGES, id_column))
     box = _columns(table, EDGES)
     table.reject(np.any(box[:, 2:] <= box[:, :2], axis=1), "empty box: x1 < x2, y1 < y2")
