@@ -11,8 +11,11 @@ from dqslam.evaluate import Report as Report
 from dqslam.evaluate import absolute_trajectory_error as absolute_trajectory_error
 from dqslam.evaluate import align_rigid as align_rigid
 from dqslam.evaluate import evaluate as evaluate
+from dqslam.evaluate import relative_pose_error as relative_pose_error
+from dqslam.evaluate_results import evaluate_results as evaluate_results
 from dqslam.experiment import run_paper as run_paper
 from dqslam.io import load_recording as load_recording
+from dqslam.io import load_results as load_results
 from dqslam.io import save_estimate as save_estimate
 from dqslam.plot import plot_maps as plot_maps
 from dqslam.problem import BoxNoise as BoxNoise
