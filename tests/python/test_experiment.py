@@ -1,11 +1,12 @@
 import json
 import multiprocessing
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from dqslam import BoxNoise, SizePrior, _core, load_scenario, simulate
-from dqslam.evaluate import Report
+from dqslam import BoxNoise, SizePrior, SolveOptions, _core, load_scenario, simulate, solve
+from dqslam.evaluate import Report, evaluate
 from dqslam.experiment import (
     Beliefs,
     Outcome,
@@ -20,10 +21,11 @@ from dqslam.experiment import (
     tabulate,
 )
 from dqslam.experiment import trial as trial_module
-from dqslam.experiment.scores import BoundScore, RobustScore
+from dqslam.experiment.scores import BoundScore, RobustScore, score_robust
 
 PAPER = load_scenario("paper")
 HONEST = load_scenario("honest")
+PER_OBJECT = ("object_ids", "class_names", "observations", "dual_quadrics", "ellipsoids")
 
 
 def report(error):
@@ -103,7 +105,7 @@ def test_json_has_null_where_no_trial_succeeded(tmp_path):
 def test_scores_by_hand():
     """Efficiency is mean error / mean bound; the intervals are those of 6 degrees of freedom."""
     bounds = [BoundScore(0.5, 1.0, 0.8, 3, 2.0, True), BoundScore(1.5, 2.0, 1.6, 3, 1.0, False)]
-    robust = [RobustScore(1.0, 0.8, 0.3, 0.1), RobustScore(0.9, 0.6, 0.5, 0.4)]
+    robust = [RobustScore(1.0, 0.8, 0.3, 0.1, 1), RobustScore(0.9, 0.6, 0.5, 0.4, 2)]
     outcomes = [
         Outcome(report(error), 1.0, bound=bound, robust=one)
         for error, bound, one in zip((1.0, 2.0), bounds, robust, strict=True)
@@ -125,6 +127,7 @@ def test_scores_by_hand():
     assert row["inlier_recall"] == pytest.approx(0.7)
     assert row["oracle_rmse_pos"] == pytest.approx({"avg": 0.4, "med": 0.4, "max": 0.5})
     assert row["oracle_rmse_landmark"] == pytest.approx({"avg": 0.25, "med": 0.25, "max": 0.4})
+    assert row["objects_dropped"] == 1.5
     assert row["failures"] == 1
 
 
@@ -253,6 +256,18 @@ def test_wrong_ids_are_found():
     assert row["inlier_recall"] > 0.85
     assert row["rmse_pos"]["avg"] < 1.5 * row["oracle_rmse_pos"]["avg"] + 0.02
     assert row["rmse_landmark"]["avg"] < 1.5 * row["oracle_rmse_landmark"]["avg"] + 0.05
+
+
+def test_who_is_told_the_right_ids_is_scored_on_the_same_objects():
+    """All boxes are right, and the estimate has every other object."""
+    recording, truth = simulate(PAPER, seed=6)
+    graph = Beliefs().graph(replace(recording, positions=None))
+    estimate, _ = solve(graph, SolveOptions())
+    half = replace(estimate, **{name: getattr(estimate, name)[::2] for name in PER_OBJECT})
+    score = score_robust(graph, graph.core.box_object >= 0, truth, half, SolveOptions())
+    assert (score.precision, score.dropped) == (1.0, 0)
+    assert score.oracle_rmse_pos == evaluate(estimate, truth).rmse_pos
+    assert score.oracle_rmse_landmark == pytest.approx(evaluate(half, truth).rmse_landmark)
 
 
 def test_the_papers_method_depends_on_its_weight(monkeypatch):

@@ -36,6 +36,7 @@ SCORES = {
     "inlier_recall": "inliers, recall",
     "oracle_rmse_pos": "told ids: positions",
     "oracle_rmse_landmark": "told ids: centres",
+    "objects_dropped": "objects left out",
 }
 EXAMPLES = 6  # maps drawn, as in the paper's figure
 

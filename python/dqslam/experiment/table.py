@@ -197,4 +197,5 @@ def _scores(outcomes: Sequence[Outcome]) -> dict[str, Any]:
         for name in ("oracle_rmse_pos", "oracle_rmse_landmark"):
             told = Statistics.of([getattr(score, name) for score in robust])
             scores[name] = asdict(told)
+        scores["objects_dropped"] = float(np.mean([score.dropped for score in robust]))
     return scores
