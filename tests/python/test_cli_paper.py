@@ -106,7 +106,10 @@ def test_failures_are_shown(tmp_path, capsys, monkeypatch):
         (["--jobs", "0"], "--jobs"),
         (["--objects", "spheres"], "--objects"),
         (["--method", "magic"], "--method"),
-        (["--scenario", "moon"], "moon: no such scenario; by name there are: honest, orbit, paper"),
+        (
+            ["--scenario", "moon"],
+            "moon: no such scenario; by name there are: honest, honest_orbit, orbit, paper",
+        ),
         (["--wrong-associations", "0.5"], "--wrong-associations"),
         (["--loss", "l1"], "'l1' is not one of 'none', 'huber', 'cauchy', 'dcs', 'switchable'"),
         (["--wrong-association-kind", "swap"], "'swap' is not one of 'random', 'structured'"),

@@ -46,6 +46,12 @@ def test_a_file_may_only_have_what_differs(tmp_path):
     assert near == paper.model_copy(update=changes)
 
 
+def test_what_comes_with_dqslam_is_whole():
+    for path in sorted(PAPER.parent.glob("*.toml")):
+        assert load_scenario(path.stem).name == path.stem
+    assert load_scenario("honest_orbit").path == load_scenario("orbit").path
+
+
 @pytest.mark.parametrize(
     ("base", "error", "message"),
     [
