@@ -37,8 +37,8 @@ class BoxNoise:
 
 # Two boxes do not tell an object's distance from its size.
 FEWEST_INLIER_VIEWS = 3
-# A few boxes fit some ellipsoid even if all of them are wrong. So many must, or that share of all if
-# that is fewer: of a moved object, a small share of many boxes may fit at one of its places.
+# A few boxes fit some ellipsoid even if all of them are wrong: so many must, or that share of all
+# if that is fewer. Of a moved object, a small share of many boxes may fit at one of its places.
 ENOUGH_INLIERS = 6
 ENOUGH_INLIER_SHARE = 1.0 / 3.0
 

@@ -49,8 +49,8 @@ def paper(
         str,
         typer.Option(
             metavar="NAME|FILE",
-            help="paper; orbit: SE(3), hand-held; honest, honest_orbit: all drawn as believed; or a "
-            "TOML file like theirs.",
+            help="paper; orbit: SE(3), hand-held; honest, honest_orbit: all drawn as believed; "
+            "or a TOML file like theirs.",
         ),
     ] = "paper",
     objects: Annotated[
