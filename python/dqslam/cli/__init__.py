@@ -10,6 +10,7 @@ from dqslam.cli.ablation import ablation
 from dqslam.cli.convert import convert
 from dqslam.cli.degeneracy import degeneracy
 from dqslam.cli.evaluate import evaluate
+from dqslam.cli.inspect import inspect
 from dqslam.cli.paper import paper
 from dqslam.cli.run import run
 
@@ -23,6 +24,7 @@ app = typer.Typer(
 app.command()(paper)
 app.command()(run)
 app.command()(evaluate)
+app.command()(inspect)
 app.command()(convert)
 app.command()(degeneracy)
 app.command()(ablation)

@@ -121,17 +121,18 @@ def whole_folder(path: str | Path) -> Iterator[Path]:
 
 def write_json(path: str | Path, content: dict[str, Any]) -> None:
     """Write JSON that every reader accepts: NaN and infinity become null."""
-    text = json.dumps(_jsonable(content), indent=2, allow_nan=False, ensure_ascii=False)
+    text = json.dumps(jsonable(content), indent=2, allow_nan=False, ensure_ascii=False)
     write_text(path, text + "\n")
 
 
-def _jsonable(value: Any) -> Any:
+def jsonable(value: Any) -> Any:
+    """Return plain lists, tables, texts and numbers; what is not finite becomes None."""
     if isinstance(value, dict):
-        return {str(key): _jsonable(item) for key, item in value.items()}
+        return {str(key): jsonable(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_jsonable(item) for item in value]
+        return [jsonable(item) for item in value]
     if isinstance(value, np.ndarray | np.generic):
-        return _jsonable(value.tolist())
+        return jsonable(value.tolist())
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value

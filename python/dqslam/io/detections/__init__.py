@@ -29,9 +29,10 @@ def read_detections(
     frames: FrameTimes | None = None,
     classes: dict[int, str] | None = None,
     cut: bool = True,
+    check: bool = True,
     topic: str | None = None,
 ) -> DetectionTable:
-    """Read boxes, checked.
+    """Read boxes.
 
     Parameters
     ----------
@@ -48,12 +49,17 @@ def read_detections(
     cut
         Parts of boxes outside of the image are cut off, and a box that is wholly outside is
         refused.
+    check
+        Boxes that are inverted, scores beyond 0 and 1 and times that do not increase are refused.
+        Without, all is as the file has it, for those who look for mistakes.
     topic
         Of a bag with several.
     """
     chosen = choose_format(path, format, DETECTION_FORMATS, "detections")
     options = topic_option(chosen.name, topic)
     table = chosen.read(path, width=width, height=height, frames=frames, classes=classes, **options)
+    if not check:
+        return table
     return checked(table, width=width, height=height, cut=cut)
 
 

@@ -1,0 +1,155 @@
+"""``dqslam inspect``: what is in a recording, and which of the usual mistakes."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from dqslam.inspect_recording import Inspection
+
+MOST_LISTED = 8
+
+
+def inspect(
+    camera: Annotated[Path, typer.Option(help="Camera: JSON, TOML, ROS, COLMAP, KITTI, bag.")],
+    odometry: Annotated[Path, typer.Option(help="Trajectory: TUM, KITTI, EuRoC, bag.")],
+    detections: Annotated[Path, typer.Option(help="Boxes: CSV, COCO, YOLO, MOT, bag.")],
+    formats: Annotated[
+        list[str] | None,
+        typer.Option("--format", metavar="NAME", help="Of a file, where its look does not tell."),
+    ] = None,
+    frame_times: Annotated[
+        Path | None, typer.Option(help="Times of frames: KITTI times.txt, TUM rgb.txt, frames.csv.")
+    ] = None,
+    frame_rate: Annotated[
+        float | None, typer.Option(metavar="HZ", help="Or frames a second, frame 0 at 0 s.")
+    ] = None,
+    ids: Annotated[
+        Literal["track_id", "class_id"] | None,
+        typer.Option(help="The column that tells objects apart. Default: boxes that overlap."),
+    ] = None,
+    max_time_difference: Annotated[
+        float | None,
+        typer.Option(help="Seconds from a box to its pose. Default: half the interval of poses."),
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    strict: Annotated[bool, typer.Option("--strict", help="Exit with 1 if there are warnings.")] = (
+        False
+    ),
+) -> None:
+    """Say what is in a recording, and warn of the usual mistakes.
+
+    Poses the wrong way round, x y width height for corners, another image size, a lens whose
+    distortion is missing, clocks that do not meet: each by a check that compares two readings.
+    """
+    from dqslam import io
+    from dqslam.inspect_recording import inspect_recording
+
+    names = io.split_formats(formats or [])
+    frames = io.choose_frame_times(odometry, detections, names, times=frame_times, rate=frame_rate)
+    lens = io.read_camera(camera, names.camera)
+    table = io.read_detections(
+        detections,
+        names.detections,
+        width=lens.width,
+        height=lens.height,
+        frames=frames,
+        cut=False,
+        check=False,
+    )
+    inspection = inspect_recording(
+        lens,
+        io.read_trajectory(odometry, names.trajectory, frames=frames),
+        table,
+        ids=ids,
+        max_time_difference=max_time_difference,
+    )
+    if as_json:
+        _print_json(inspection)
+    else:
+        _show(inspection)
+    if strict and inspection.findings:
+        raise typer.Exit(1)
+
+
+def _print_json(inspection: "Inspection") -> None:
+    from dqslam.io.files import jsonable
+
+    content = {
+        **inspection.summary,
+        "warnings": [vars(finding) for finding in inspection.findings],
+        "unchecked": inspection.unchecked,
+    }
+    typer.echo(json.dumps(jsonable(content), indent=2, allow_nan=False, ensure_ascii=False))
+
+
+def _show(inspection: "Inspection") -> None:
+    from rich.console import Console
+
+    console = Console()
+    console.print(_overview(inspection.summary))
+    for finding in inspection.findings:
+        text = f"warning: {finding.check}: {finding.message}"
+        console.print(text, style="bold red", markup=False, highlight=False, soft_wrap=True)
+    for check, why in inspection.unchecked.items():
+        text = f"not checked: {check}: {why}"
+        console.print(text, markup=False, highlight=False, soft_wrap=True)
+    if not inspection.findings:
+        console.print("no mistake found")
+
+
+def _overview(summary: dict[str, Any]) -> "Table":
+    from rich.box import SIMPLE_HEAD
+    from rich.markup import escape
+    from rich.table import Table
+
+    camera, path, boxes = summary["camera"], summary["trajectory"], summary["detections"]
+    overlap, border = summary["overlap"], boxes["at_border"]
+    across, down = camera["field_of_view_deg"]
+    lens = "with" if camera["distortion"] is not None else "without"
+    table = Table(box=SIMPLE_HEAD, show_header=False)
+    rows = {
+        "camera": f"{camera['width']} x {camera['height']} px, {across:.0f} x {down:.0f} degrees, "
+        f"{lens} distortion",
+        "poses": f"{path['poses']}, {_clock(path)}",
+        "path": f"{path['length_m']:.2f} m, extent "
+        f"{' x '.join(f'{side:.2f}' for side in path['extent_m'])} m, "
+        f"largest step {path['largest_step_m']:.3f} m",
+        "boxes": f"{boxes['boxes']} in {boxes['frames']} frames, {_clock(boxes)}",
+        "boxes a frame": _spread(boxes["boxes_a_frame"]),
+        "time together": f"{overlap['seconds']:.3f} s; {overlap['boxes_with_pose']} boxes have a "
+        f"pose within {overlap['tolerance_s']:.4g} s, {overlap['boxes_without_pose']} have none",
+        "objects": "no ids"
+        if boxes["objects"] is None
+        else f"{boxes['objects']}; {boxes['boxes_without_object']} boxes without one",
+        "classes": escape(_listed([f"{k} {n}" for k, n in boxes["classes"].items()])),
+        "score": _spread(boxes["score"]),
+        "width, px": _spread(boxes["width_px"]),
+        "height, px": _spread(boxes["height_px"]),
+        "at the border": f"{border['any']} boxes: left {border['left']}, top {border['top']}, "
+        f"right {border['right']}, bottom {border['bottom']}",
+    }
+    for name, text in rows.items():
+        table.add_row(name, text)
+    return table
+
+
+def _clock(entry: dict[str, Any]) -> str:
+    rate = "no rate" if entry["rate_hz"] is None else f"{entry['rate_hz']:.4g} Hz"
+    text = f"{entry['start_s']:.3f} to {entry['end_s']:.3f} s at {rate}"
+    gaps = [f"{gap['seconds']:.3g} s after {gap['after_s']:.3f}" for gap in entry["gaps"]]
+    return text + (f", {len(gaps)} gaps: {_listed(gaps)}" if gaps else ", no gap")
+
+
+def _listed(texts: list[str]) -> str:
+    more = f", and {len(texts) - MOST_LISTED} more" if len(texts) > MOST_LISTED else ""
+    return ", ".join(texts[:MOST_LISTED]) + more
+
+
+def _spread(values: list[float]) -> str:
+    least, lower, median, upper, largest = (f"{value:.4g}" for value in values)
+    return f"{least} to {largest}, median {median}, half in {lower} to {upper}"

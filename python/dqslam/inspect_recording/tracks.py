@@ -1,0 +1,107 @@
+"""Which boxes show the same object: by their ids, else by overlap from frame to frame."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dqslam.io import DetectionTable
+
+Ids = Literal["track_id", "class_id"]
+
+# Boxes of one class that overlap this much in successive frames are of one object.
+LEAST_OVERLAP = 0.5
+# A class that has one box in so many of its frames has one object.
+ALONE_SHARE = 0.95
+# What a track is worth: seen often, and not so often that it takes time.
+FEWEST_VIEWS, MOST_VIEWS = 5, 40
+FEWEST_TRACKS, MOST_TRACKS = 3, 150
+LEAST_SCORE = 0.3
+
+
+def find_tracks(table: DetectionTable, ids: Ids | None) -> list[NDArray[np.int64]]:
+    """Return the rows of each track, in order of frames; longest tracks first.
+
+    Without ``ids`` boxes are joined by their overlap; where that gives next to nothing, as in
+    images far apart, classes of one object join them. Of two boxes of an object in a frame the
+    better counts; long tracks are thinned evenly.
+    """
+    rows = np.flatnonzero(table.score >= min(LEAST_SCORE, float(np.median(table.score))))
+    if ids is not None:
+        column = table.class_id if ids == "class_id" else table.track_id
+        return [] if column is None else _grouped(table, rows, column[rows])
+    tracks = _grouped(table, rows, overlap_ids(table, rows))
+    if len(tracks) >= FEWEST_TRACKS:
+        return tracks
+    return tracks + _grouped(table, rows, _lone_classes(table, rows))
+
+
+def overlap_ids(table: DetectionTable, rows: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Give boxes (m,) one number that overlap best, both ways, from one frame to the next."""
+    label = np.full(len(rows), -1, dtype=np.int64)
+    order = np.argsort(table.frame[rows], kind="stable")
+    starts = np.flatnonzero(np.diff(table.frame[rows][order])) + 1
+    fresh = 0
+    previous: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
+    for here in np.split(order, starts):
+        if previous.size:
+            shared = overlap(table.box[rows[previous]], table.box[rows[here]])
+            same = table.class_id[rows[previous]][:, None] == table.class_id[rows[here]]
+            shared = np.where(same, shared, 0)
+            best = np.argmax(shared, axis=0)
+            mutual = np.argmax(shared, axis=1)[best] == np.arange(len(here))
+            joined = mutual & (shared[best, np.arange(len(here))] >= LEAST_OVERLAP)
+            label[here[joined]] = label[previous[best[joined]]]
+        new = here[label[here] < 0]
+        label[new] = np.arange(fresh, fresh + len(new))
+        fresh += len(new)
+        previous = here
+    return label
+
+
+def overlap(boxes: NDArray[np.float64], others: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return intersection over union of boxes (a, 4) with others (b, 4): shape (a, b)."""
+    low = np.maximum(boxes[:, None, :2], others[None, :, :2])
+    high = np.minimum(boxes[:, None, 2:], others[None, :, 2:])
+    both = np.prod(np.clip(high - low, 0, None), axis=2)
+    areas = [np.prod(box[:, 2:] - box[:, :2], axis=1) for box in (boxes, others)]
+    union = areas[0][:, None] + areas[1][None] - both
+    shared: NDArray[np.float64] = both / np.where(union > 0, union, 1.0)
+    return shared
+
+
+def _lone_classes(table: DetectionTable, rows: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Label boxes (m,) by their class where that has one object, else -1."""
+    label = np.full(len(rows), -1, dtype=np.int64)
+    for number in np.unique(table.class_id[rows]).tolist():
+        of_class = np.flatnonzero(table.class_id[rows] == number)
+        frames, counts = np.unique(table.frame[rows[of_class]], return_counts=True)
+        if np.mean(counts == 1) >= ALONE_SHARE:
+            alone = np.isin(table.frame[rows[of_class]], frames[counts == 1])
+            label[of_class[alone]] = number
+    return label
+
+
+def _grouped(
+    table: DetectionTable, rows: NDArray[np.int64], label: NDArray[np.int64]
+) -> list[NDArray[np.int64]]:
+    rows, label = rows[label >= 0], label[label >= 0]
+    if not rows.size:
+        return []
+    order = np.lexsort((-table.score[rows], table.frame[rows], label))
+    rows, label = rows[order], label[order]
+    again = (label[1:] == label[:-1]) & (table.frame[rows][1:] == table.frame[rows][:-1])
+    keep = np.concatenate([[True], ~again])
+    rows, label = rows[keep], label[keep]
+    groups = np.split(rows, np.flatnonzero(np.diff(label)) + 1)
+    seen_often = sorted((group for group in groups if len(group) >= FEWEST_VIEWS), key=len)
+    return [_thinned(group) for group in seen_often[::-1][:MOST_TRACKS]]
+
+
+def _thinned(group: NDArray[np.int64]) -> NDArray[np.int64]:
+    if len(group) <= MOST_VIEWS:
+        return group
+    kept: NDArray[np.int64] = group[np.linspace(0, len(group) - 1, MOST_VIEWS).round().astype(int)]
+    return kept
