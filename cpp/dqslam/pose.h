@@ -98,6 +98,9 @@ struct Se2 {
   static void FromTangent(const T* tangent, T* relative) {
     for (int i = 0; i < 3; ++i) relative[i] = tangent[i];
   }
+
+  /// Undoes what rounding does to a pose that is composed again and again: nothing in SE(2).
+  static void Normalize(double*) {}
 };
 
 struct Se3 {
@@ -137,6 +140,9 @@ struct Se3 {
   static void FromTangent(const T* tangent, T* relative) {
     Write<T>(Translation(tangent), ExpRotation<T>(Translation(tangent + 3)), relative);
   }
+
+  /// Undoes what rounding does to the quaternion of a pose that is composed again and again.
+  static void Normalize(double* pose) { Eigen::Map<Eigen::Vector4d>(pose + 3).normalize(); }
 
  private:
   template <typename T>

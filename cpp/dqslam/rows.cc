@@ -29,6 +29,7 @@ RowMatrix ComposeRows(PoseModel model, const RowMatrix& a, const RowMatrix& b) {
     RowMatrix result(a.rows(), Pose::kSize);
     for (Eigen::Index i = 0; i < a.rows(); ++i) {
       Pose::Compose(a.row(i).data(), b.row(i).data(), result.row(i).data());
+      Pose::Normalize(result.row(i).data());
     }
     return result;
   });
@@ -42,6 +43,7 @@ RowMatrix BetweenRows(PoseModel model, const RowMatrix& a, const RowMatrix& b) {
     RowMatrix result(a.rows(), Pose::kSize);
     for (Eigen::Index i = 0; i < a.rows(); ++i) {
       Pose::Between(a.row(i).data(), b.row(i).data(), result.row(i).data());
+      Pose::Normalize(result.row(i).data());
     }
     return result;
   });
@@ -55,6 +57,7 @@ RowMatrix PlusRows(PoseModel model, const RowMatrix& poses, const RowMatrix& tan
     RowMatrix result(poses.rows(), Pose::kSize);
     for (Eigen::Index i = 0; i < poses.rows(); ++i) {
       Plus<Pose>(poses.row(i).data(), tangents.row(i).data(), result.row(i).data());
+      Pose::Normalize(result.row(i).data());
     }
     return result;
   });
@@ -82,6 +85,7 @@ RowMatrix DeadReckonRows(PoseModel model, const Eigen::VectorXd& first, const Ro
     result.row(0) = first;
     for (Eigen::Index i = 0; i < relative.rows(); ++i) {
       Pose::Compose(result.row(i).data(), relative.row(i).data(), result.row(i + 1).data());
+      Pose::Normalize(result.row(i + 1).data());
     }
     return result;
   });

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "dqslam/dispatch.h"
 #include "dqslam/grow.h"
 #include "dqslam/recover.h"
 #include "dqslam/robust.h"
@@ -173,6 +174,9 @@ Solution Solve(const Graph& graph,
   solution.svd_singular_values = options.start == Start::kSvd
                                      ? solver.SvdSingularValues()
                                      : RowMatrix::Constant(graph.num_objects(), 10, std::nan(""));
+  Dispatch(graph.pose_model, [&state](auto pose) {
+    for (int row = 0; row < state.poses.rows(); ++row) pose.Normalize(state.poses.row(row).data());
+  });
   solution.poses = state.poses;
   solution.inliers = solver.Inliers(state);
   solution.landmarks = state.landmarks;

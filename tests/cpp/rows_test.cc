@@ -111,6 +111,16 @@ void ExpectShapeError(const std::string& message, const std::function<void()>& c
   }
 }
 
+// Files give quaternions to nine digits: over a long path the norms would drift apart.
+TEST(DeadReckonRows, KeepsQuaternionsUnit) {
+  RowMatrix relative(5000, 7);
+  relative.rowwise() = Eigen::Matrix<double, 1, 7>(0.1, 0, 0, 0, 0, 0.1 * (1 + 1e-9), std::sqrt(0.99));
+  Eigen::VectorXd first = Eigen::VectorXd::Zero(7);
+  first[6] = 1;
+  const RowMatrix path = DeadReckonRows(PoseModel::kSe3, first, relative);
+  EXPECT_LT((path.rightCols<4>().rowwise().norm().array() - 1).abs().maxCoeff(), 1e-14);
+}
+
 TEST(RowShapes, NameTheTableOfTheWrongShape) {
   const RowMatrix two = RowMatrix::Zero(2, 3), three = RowMatrix::Zero(3, 3);
   const RowMatrix wide = RowMatrix::Zero(2, 7);
