@@ -86,7 +86,7 @@ def test_bad_rows_are_named(tmp_path, row, message):
     [
         ([""], r"boxes\.csv: is empty"),
         (["# only"], r"boxes\.csv: holds nothing but comments"),
-        ([HEADER], r"boxes\.csv: holds no boxes"),
+        ([HEADER], r"boxes\.csv: holds no rows, only a header"),
         ([GOOD], r"boxes\.csv:1: no column frame, timestamp"),
         (["# c", HEADER.replace("x2", "right"), GOOD], r":2: no column x2 \(it has: frame"),
         ([HEADER.replace("y2", "y1"), GOOD], r":1: no column y2"),

@@ -60,9 +60,10 @@ def test_what_is_written_is_read_back(tmp_path):
         ),
         (["frame,time", "0,0"], r":1: no column timestamp \(it has: frame, time\)"),
         (["frame,timestamp", "0,0", "1"], r":3: 1 fields, but 2 columns"),
-        (["frame,timestamp"], r"holds no times, only a header"),
+        (["frame,timestamp"], r"holds no rows, only a header"),
         (["frame,timestamp", "0.5,0"], r":2: frame is 0\.5, not a whole number"),
         (["frame,timestamp", "1,0", "0,1"], r":3: frame 0 at 1\.0 s is not later"),
+        (["frame,timestamp", '0,"1', "1,2"], r"not CSV"),
         ([""], r"is empty"),
     ],
 )

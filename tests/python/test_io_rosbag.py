@@ -8,6 +8,7 @@ from dqslam.io.rosbag import VISION_MSGS
 
 pytest.importorskip("rosbags", reason="rosbags is not installed: pip install 'dqslam[rosbag]'")
 
+from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
@@ -25,6 +26,15 @@ OLDER = {
     ),
     "vision_msgs/msg/Detection2DArray": (
         "std_msgs/Header header\nvision_msgs/Detection2D[] detections\n"
+    ),
+}
+ROS_1 = OLDER | {
+    "vision_msgs/msg/ObjectHypothesisWithPose": (
+        "int64 id\nfloat64 score\ngeometry_msgs/PoseWithCovariance pose\n"
+    ),
+    "vision_msgs/msg/Detection2D": (
+        "std_msgs/Header header\nvision_msgs/ObjectHypothesisWithPose[] results\n"
+        "vision_msgs/BoundingBox2D bbox\n"
     ),
 }
 
@@ -192,6 +202,53 @@ def test_what_is_no_bag(tmp_path, bag):
     (tmp_path / "bad.mcap").write_bytes(b"no bag at all")
     with pytest.raises(FileError, match=r"bad\.mcap: is no bag that can be read"):
         read_trajectory(tmp_path / "bad.mcap")
+    many = {"/odom": [bag.odometry(i, (1, 2, 3), (0, 0, 0, 1)) for i in range(300)]}
+    for plugin in StoragePlugin:
+        path = bag.write(tmp_path / plugin.name, many, plugin)
+        (file,) = (file for file in path.iterdir() if file.suffix in (".db3", ".mcap"))
+        whole = file.read_bytes()
+        for share in (0, 0.5, 0.99):
+            file.write_bytes(whole[: int(share * len(whole))])
+            with pytest.raises(FileError, match=r"is no bag that can be read"):
+                read_trajectory(path)
     path = bag.write(tmp_path / "bag", {"/odom": [bag.odometry(*ODOMETRY[0])]})
     with pytest.raises(FileError, match=r"no topic of sensor_msgs/msg/CameraInfo \(it has: /odom"):
         read_camera(path)
+
+
+def test_a_bag_of_ros_1(tmp_path):
+    """There headers count, hypotheses are numbers, and the fields of CameraInfo are capitals."""
+    store = get_typestore(Stores.ROS1_NOETIC)
+    for name, text in ROS_1.items():
+        store.register(get_types_from_msg(text, name))
+    bag = Bag()
+    bag.store = store
+
+    def header(time):
+        stamp = bag.make("builtin_interfaces/msg/Time", int(time), round(time % 1 * 1e9))
+        return bag.make("std_msgs/msg/Header", 7, stamp, "map")
+
+    bag.header = header
+    odometry, message = bag.odometry(*ODOMETRY[0])
+    hypothesis = bag.make("vision_msgs/msg/ObjectHypothesisWithPose", 3, 0.5, bag.pose())
+    center = bag.make("geometry_msgs/msg/Pose2D", 100.0, 50.0, 0.0)
+    box = bag.make("vision_msgs/msg/BoundingBox2D", center, 40.0, 20.0)
+    detection = bag.make("vision_msgs/msg/Detection2D", header(1.5), [hypothesis], box)
+    arrays = "vision_msgs/msg/Detection2DArray"
+    camera, info = bag.camera()
+    rows = {
+        "/odom": (odometry, message),
+        "/boxes": (arrays, bag.make(arrays, header(1.5), [detection])),
+        "/info": (camera, info),
+    }
+    path = tmp_path / "old.bag"
+    with Writer1(path) as writer:
+        for topic, (name, content) in rows.items():
+            connection = writer.add_connection(topic, name, typestore=store)
+            writer.write(connection, 0, store.serialize_ros1(content, name))
+    times, poses = read_trajectory(path)
+    assert (times.tolist(), poses[0].tolist()) == ([100.25], [1, 2, 3, 0, 0, 0.6, 0.8])
+    table = read_detections(path)
+    assert table.box.tolist() == [[80, 40, 120, 60]]
+    assert (table.class_id.tolist(), table.track_id) == ([3], None)
+    assert (read_camera(path).fx, read_camera(path).distortion[4]) == (500.5, 0.05)

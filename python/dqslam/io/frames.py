@@ -11,7 +11,6 @@ Times are seconds and increase with the frame.
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -20,7 +19,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dqslam.io.files import FileError, parse_integers, parse_numbers, read_rows, write_text
+from dqslam.io.csv_table import read_csv
+from dqslam.io.files import FileError, parse_numbers, read_rows, write_text
 
 COLUMNS = ("frame", "timestamp")
 
@@ -64,17 +64,21 @@ def read_frame_times(path: str | Path) -> FrameTimes:
     rows, lines = read_rows(path)
     names: dict[str, int] = {}
     if "," in rows[0]:
-        frames, cells, lines = _columns(path, rows, lines)
+        table = read_csv(path, required=COLUMNS)
+        frames, times, lines = (
+            table.integers("frame"),
+            table.numbers("timestamp"),
+            list(table.lines),
+        )
     else:
-        frames = np.arange(len(rows))
         fields = [row.split() for row in rows]
         for row, line in zip(fields, lines, strict=True):
             if len(row) not in (1, 2) or len(row) != len(fields[0]):
                 raise FileError(path, f"{len(row)} fields, not time, or time and filename", line)
-        cells = [row[0] for row in fields]
+        frames = np.arange(len(rows))
+        times = parse_numbers(path, "timestamp", [row[0] for row in fields], lines)
         if len(fields[0]) == 2:
             names = {image_name(row[1]): i for i, row in enumerate(fields)}
-    times = parse_numbers(path, "timestamp", cells, lines)
     late = np.flatnonzero((np.diff(times) <= 0) | (np.diff(frames) <= 0))
     if late.size:
         i = int(late[0])
@@ -83,8 +87,8 @@ def read_frame_times(path: str | Path) -> FrameTimes:
             f"frame {frames[i]} at {times[i].item()!r} s (line {lines[i]})"
         )
         raise FileError(path, message, lines[i + 1])
-    table = dict(zip(frames.tolist(), times.tolist(), strict=True))
-    return FrameTimes(str(path), table, names=names)
+    by_frame = dict(zip(frames.tolist(), times.tolist(), strict=True))
+    return FrameTimes(str(path), by_frame, names=names)
 
 
 def write_frame_times(path: str | Path, frames: ArrayLike, times: ArrayLike) -> None:
@@ -117,21 +121,3 @@ def frame_of(name: str, frames: FrameTimes | None) -> int | None:
         return frames.names.get(name)
     digits = name.replace("-", "_").rpartition("_")[2]
     return int(digits) if digits.isascii() and digits.isdigit() and len(digits) < 16 else None
-
-
-def _columns(
-    path: str | Path, rows: Sequence[str], lines: Sequence[int]
-) -> tuple[NDArray[np.int64], list[str], list[int]]:
-    header, *records = csv.reader(rows)
-    header = [name.strip() for name in header]
-    missing = [name for name in COLUMNS if name not in header]
-    if missing:
-        message = f"no column {', '.join(missing)} (it has: {', '.join(header)})"
-        raise FileError(path, message, lines[0])
-    if not records:
-        raise FileError(path, "holds no times, only a header")
-    for record, line in zip(records, lines[1:], strict=True):
-        if len(record) != len(header):
-            raise FileError(path, f"{len(record)} fields, but {len(header)} columns", line)
-    frame, time = ([record[header.index(name)] for record in records] for name in COLUMNS)
-    return parse_integers(path, "frame", frame, lines[1:]), time, list(lines[1:])

@@ -6,7 +6,6 @@ are pixel centres, the first pixel's is 0: the image spans [-0.5, width - 0.5].
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -67,11 +66,6 @@ def checked(
         raise table.error(row, f"score is {table.score[row]:g}, not between 0 and 1")
     _check_times(table)
     return table
-
-
-def parse_filled(cells: Sequence[str], default: float) -> list[str]:
-    """Put a default in place of empty cells."""
-    return [cell if cell.strip() else str(default) for cell in cells]
 
 
 def _check_shape(table: DetectionTable) -> None:
