@@ -40,12 +40,15 @@ TYPED_TEST(Rows, DoWhatThePoseModelDoesRowByRow) {
     Eigen::Matrix<double, TypeParam::kSize, 1> pose;
     Eigen::Matrix<double, TypeParam::kTangentSize, 1> tangent;
     TypeParam::Compose(a.row(row).data(), b.row(row).data(), pose.data());
+    TypeParam::Normalize(pose.data());
     EXPECT_EQ(composed.row(row), pose.transpose());
     TypeParam::Between(a.row(row).data(), b.row(row).data(), pose.data());
+    TypeParam::Normalize(pose.data());
     EXPECT_EQ(between.row(row), pose.transpose());
     Minus<TypeParam>(b.row(row).data(), a.row(row).data(), tangent.data());
     EXPECT_EQ(minus.row(row), tangent.transpose());
     Plus<TypeParam>(a.row(row).data(), tangent.data(), pose.data());
+    TypeParam::Normalize(pose.data());
     EXPECT_EQ(plus.row(row), pose.transpose());
   }
 }
@@ -114,7 +117,9 @@ void ExpectShapeError(const std::string& message, const std::function<void()>& c
 // Files give quaternions to nine digits: over a long path the norms would drift apart.
 TEST(DeadReckonRows, KeepsQuaternionsUnit) {
   RowMatrix relative(5000, 7);
-  relative.rowwise() = Eigen::Matrix<double, 1, 7>(0.1, 0, 0, 0, 0, 0.1 * (1 + 1e-9), std::sqrt(0.99));
+  Eigen::Matrix<double, 1, 7> step;
+  step << 0.1, 0, 0, 0, 0, 0.1 * (1 + 1e-9), std::sqrt(0.99);
+  relative.rowwise() = step;
   Eigen::VectorXd first = Eigen::VectorXd::Zero(7);
   first[6] = 1;
   const RowMatrix path = DeadReckonRows(PoseModel::kSe3, first, relative);
