@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
+import contextlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +11,6 @@ from typing import Generic, TypeVar
 from dqslam.io.files import FileError, read_rows
 
 Content = TypeVar("Content")
-HEAD_LINES = 200
 
 
 @dataclass(frozen=True)
@@ -84,11 +83,10 @@ def look_at(path: str | Path) -> Look:
         raise FileError(path, "no such file")
     first = ""
     if path.is_file():
-        try:
-            with path.open(encoding="utf-8-sig") as file:
-                head = list(itertools.islice(file, HEAD_LINES))
-        except (OSError, UnicodeDecodeError):
-            head = []
-        rows = [line.strip() for line in head if not line.lstrip().startswith("#")]
-        first = next((row for row in rows if row), "")
+        with (
+            contextlib.suppress(OSError, UnicodeDecodeError),
+            path.open(encoding="utf-8-sig") as file,
+        ):
+            rows = (line.strip() for line in file)
+            first = next((row for row in rows if row and not row.startswith("#")), "")
     return Look(path, first)

@@ -117,7 +117,7 @@ def frame_of(name: str, frames: FrameTimes | None) -> int | None:
     neither.
     """
     name = image_name(name)
-    if frames is not None and frames.names:
-        return frames.names.get(name)
+    if frames is not None and name in frames.names:
+        return frames.names[name]
     digits = name.replace("-", "_").rpartition("_")[2]
     return int(digits) if digits.isascii() and digits.isdigit() and len(digits) < 16 else None

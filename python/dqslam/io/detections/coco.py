@@ -108,6 +108,7 @@ def read_categories(path: str | Path) -> dict[int, str]:
 def _frame(entry: Entry, images: dict[Any, str], frames: FrameTimes | None) -> int:
     image = entry.value("image_id")
     name = images.get(image) if isinstance(image, int | str) else None
+    # A dataset numbers its images as it likes: their names go first where they have times.
     if name is not None and frames is not None and frames.names:
         number = frame_of(name, frames)
         if number is None:
@@ -116,8 +117,8 @@ def _frame(entry: Entry, images: dict[Any, str], frames: FrameTimes | None) -> i
     if isinstance(image, str):
         number = frame_of(image, frames)
         if number is None:
-            message = f"image_id {image!r} is no number of a frame: name the images' times"
-            raise entry.error(f"{message} with --frame-times FILE")
+            message = f"image_id {image!r} is no number of a frame, and in no --frame-times"
+            raise entry.error(message)
         return number
     return entry.integer("image_id")
 

@@ -128,8 +128,7 @@ def _read_rows(
             continue  # an image without boxes
         number = frame_of(file.name, frames)
         if number is None:
-            message = "its name is no number of a frame: name the images' times"
-            raise FileError(file, f"{message} with --frame-times FILE")
+            raise FileError(file, "its name is no number of a frame, and in no --frame-times")
         for row, line in zip(*read_rows(file), strict=True):
             cells = row.split()
             if not 5 <= len(cells) <= len(FIELDS):
