@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import realdata
-from dqslam import Camera
+from dqslam import Camera, _core
 from dqslam.cli import main
 from dqslam.inspect_recording import inspect_recording
 from dqslam.inspect_recording.rays import Views, inverted, residuals
@@ -109,7 +109,7 @@ def test_inverted_poses_are_found(right):
     inspection = inspect(camera, Trajectory(times, inverted(poses)), table, ids)
     assert [finding.check for finding in inspection.findings] == ["pose direction"]
     assert "camera_from_world" in inspection.findings[0].message
-    assert inspection.unchecked["distortion"] == "after pose direction is put right"
+    assert inspection.unchecked["distortion"] == "pose direction comes first"
 
 
 def test_width_and_height_for_corners_are_found(right):
@@ -140,32 +140,46 @@ def test_another_image_size_is_found(right, planted):
     assert found(resized(camera, *size), *rest) == ["image size"]
 
 
-def test_a_larger_image_with_its_principal_point_is_found_by_the_border(right):
+@pytest.mark.parametrize("kind", ["table top without ids", "desk", "desk by motion capture"])
+def test_a_larger_image_with_its_principal_point_is_found_by_the_border(kind):
     """Both scaled: only that boxes pile up where the true image ends can tell."""
-    camera, trajectory, table, ids = right
-    end = np.array([camera.width, camera.height]) - 0.5
-    cut = np.clip(table.box, -0.5, np.tile(end, 2))
-    piled = np.sum(cut[:, 2] > cut[:, 2].max() - 1)
-    if piled < max(5, 0.01 * len(cut)):
-        pytest.skip("no box is cut by the right border")
-    scaled = Camera(
-        2 * camera.fx,
-        2 * camera.fy,
-        camera.width,
-        camera.height,
-        2 * camera.width,
-        2 * camera.height,
-    )
-    assert found(scaled, trajectory, replace(table, box=cut), ids)[:1] == ["image size"]
+    camera, *rest = real(kind)
+    focal, middle = (2 * camera.fx, 2 * camera.fy), (camera.width, camera.height)
+    scaled = Camera(*focal, *middle, 2 * camera.width, 2 * camera.height)
+    assert found(scaled, *rest)[:1] == ["image size"]
 
 
-def test_a_clock_of_nanoseconds_is_found(right):
+def test_odometry_that_drifts_is_no_mistake(right):
     camera, (times, poses), table, ids = right
-    inspection = inspect(camera, Trajectory(times * 1e9, poses), table, ids)
-    if times[0] == 0:  # both clocks start at 0, and the boxes have one pose
-        return
-    (finding,) = inspection.findings
-    assert finding.message.startswith("times of the poses look like nanoseconds")
+    random = np.random.default_rng(0)
+    # 0.05 m and 0.01 rad a step, less where there are more than 500.
+    share = min(1.0, 500 / len(times))
+    steps = _core.between(_core.PoseModel.SE3, poses[:-1], poses[1:])
+    noise = random.normal(0, share * np.repeat([0.05, 0.01], 3), (len(steps), 6))
+    steps = _core.plus(_core.PoseModel.SE3, steps, noise)
+    drifted = _core.dead_reckon(_core.PoseModel.SE3, poses[0], steps)
+    assert found(camera, Trajectory(times, drifted), table, ids) == []
+    assert found(camera, Trajectory(times, inverted(drifted)), table, ids) == ["pose direction"]
+
+
+@pytest.mark.parametrize("name", ["milliseconds", "microseconds", "nanoseconds"])
+def test_another_unit_of_time_is_found(right, name):
+    camera, (times, poses), table, ids = right
+    factor = {"milliseconds": 1e3, "microseconds": 1e6, "nanoseconds": 1e9}[name]
+    (finding,) = inspect(camera, Trajectory(times * factor, poses), table, ids).findings
+    assert finding.message.startswith(f"times of the poses look like {name}")
+    ticks = replace(table, timestamp=table.timestamp * factor)
+    (finding,) = inspect(camera, Trajectory(times, poses), ticks, ids).findings
+    assert finding.message.startswith(f"times of the boxes look like {name}")
+
+
+def test_clocks_that_do_not_meet_are_found(right):
+    camera, (times, poses), table, ids = right
+    late = Trajectory(times + 2 * np.ptp(times), poses)
+    inspection = inspect(camera, late, table, ids)
+    assert [finding.check for finding in inspection.findings] == ["times"]
+    assert inspection.findings[0].message.startswith("no box has a pose within")
+    assert inspection.unchecked["pose direction"] == "times comes first"
 
 
 def test_a_lens_whose_distortion_is_missing_is_found():
@@ -238,7 +252,8 @@ def test_what_cannot_be_told_is_said(tmp_path):
     assert inspection.unchecked == {"pose direction": why, "distortion": why}
     inspection = inspect(camera, still, table, "track_id")
     assert inspection.unchecked == {
-        "pose direction": "no reading of the poses puts the objects in front of the camera"
+        "pose direction": "no reading of the poses puts the objects in front of the camera",
+        "distortion": "rays miss each other by more than the image, too much to tell a lens by",
     }
     few = replace(table, class_id=np.arange(len(table)))
     assert inspect(camera, trajectory, few, None).unchecked["pose direction"] == (

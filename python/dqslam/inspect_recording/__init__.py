@@ -70,7 +70,7 @@ def inspect_recording(
     for name, (check, after) in CHECKS.items():
         found = [other for other in after if other in findings]
         if found:
-            unchecked[name] = f"after {found[0]} is put right"
+            unchecked[name] = f"{found[0]} comes first"
             continue
         try:
             finding = check(evidence)
