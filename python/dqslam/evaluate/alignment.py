@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from dqslam._checks import Floats, as_floats
 
@@ -30,6 +29,8 @@ class Alignment:
 
     def apply_poses(self, poses: Floats) -> Floats:
         """Move poses, shape (n, 7)."""
+        from scipy.spatial.transform import Rotation
+
         turned = Rotation.from_matrix(self.rotation) * Rotation.from_quat(poses[:, 3:])
         return np.column_stack([self.apply(poses[:, :3]), turned.as_quat()])
 
@@ -78,6 +79,8 @@ def align_poses(
     lever
         Metres: how far from the cameras the points are that shall fit.
     """
+    from scipy.spatial.transform import Rotation
+
     poses = as_floats("poses", poses, [None, 7])
     true_poses = as_floats("true poses", true_poses, [None, 7])
     points, true_points = same_shape(poses[:, :3], true_poses[:, :3])

@@ -1,8 +1,6 @@
 """Intersection over union: of boxes in the image, and of ellipsoids in space."""
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
-from scipy.stats import qmc
 
 from dqslam import _core
 from dqslam._checks import Bools, Floats, Ints
@@ -25,6 +23,8 @@ def match_boxes(
     Of the boxes of one pose, pairs are chosen so that their IoUs add up to the most; one below
     ``min_iou`` is no pair. Poses are row numbers, shapes (m,) and (t,), boxes (m, 4) and (t, 4).
     """
+    from scipy.optimize import linear_sum_assignment
+
     match = np.full(len(boxes), -1, dtype=np.int64)
     for one in np.unique(pose):
         rows, true_rows = np.flatnonzero(pose == one), np.flatnonzero(true_pose == one)
@@ -90,6 +90,8 @@ def _center_and_factor(ellipsoid: Floats) -> tuple[Floats, Floats]:
 
 def _unit_ball(samples: int, seed: int) -> Floats:
     """Return points that fill the unit ball evenly, shape (samples, 3)."""
+    from scipy.stats import qmc
+
     u, v, w = qmc.Sobol(3, seed=seed).random(samples).T
     z, angle = 2.0 * u - 1.0, 2.0 * np.pi * v
     across = np.sqrt(1.0 - z**2)

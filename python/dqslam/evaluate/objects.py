@@ -4,8 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
-from scipy.spatial.transform import Rotation
 
 from dqslam._checks import Floats, Ints
 from dqslam.evaluate.alignment import Alignment, same_shape
@@ -49,6 +47,8 @@ def match_nearest(
     gates
         How far from each true object a match may be, metres, shape (t,).
     """
+    from scipy.optimize import linear_sum_assignment
+
     distance = np.linalg.norm(centers[:, None] - true_centers[None], axis=2)
     allowed = distance <= gates
     if true_class_names is not None:
@@ -96,6 +96,8 @@ def orientation_error(
     semi_axes, true_semi_axes
         Their lengths, metres, shape (3,).
     """
+    from scipy.spatial.transform import Rotation
+
     axes = rotation[:, np.argsort(semi_axes)]
     order = np.argsort(true_semi_axes)
     true_axes, lengths = true_rotation[:, order], true_semi_axes[order]

@@ -1,13 +1,15 @@
 """Absolute and relative errors of a trajectory."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from dqslam._checks import Floats, Ints, as_floats
 from dqslam.evaluate.alignment import Align, Alignment, align_positions, same_shape
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 
 @dataclass(frozen=True)
@@ -115,8 +117,10 @@ def relative_pose_error(
     return RelativePoseError(len(first), statistics(distance), statistics(angle))
 
 
-def _motion(poses: Floats, first: Ints, last: Ints) -> tuple[Floats, Rotation]:
+def _motion(poses: Floats, first: Ints, last: Ints) -> "tuple[Floats, Rotation]":
     """Return last_in_first: positions, shape (p, 3), and rotations."""
+    from scipy.spatial.transform import Rotation
+
     turns = Rotation.from_quat(poses[:, 3:])
     back = turns[first].inv()
     return back.apply(poses[last, :3] - poses[first, :3]), back * turns[last]

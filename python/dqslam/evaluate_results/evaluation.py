@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any, Literal
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from dqslam._checks import Floats
 from dqslam.evaluate import Align, Alignment, align_poses, align_positions
@@ -50,6 +49,8 @@ def evaluate_results(
     max_time_difference
         Seconds between times that count as the same, by default half the interval of poses.
     """
+    from scipy.spatial.transform import Rotation
+
     rows, true_rows = common_poses(results.timestamps, groundtruth, max_time_difference)
     true_poses = groundtruth.world_from_camera[true_rows]
 
@@ -95,6 +96,8 @@ def object_alignment(
     free. They have to do where the poses do not agree, as with the pose of a body that looks
     elsewhere than the camera.
     """
+    from scipy.spatial.transform import Rotation
+
     path = results.world_from_camera[:, :3]
     nearest = [np.linalg.norm(path - center, axis=1).min() for center in results.objects.center]
     lever = float(np.median(nearest)) if nearest else 0.0

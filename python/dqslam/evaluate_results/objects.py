@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any, Literal
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from dqslam import _core
 from dqslam._checks import Bools, Floats
@@ -130,6 +129,8 @@ def _compare_shapes(
     objects: MapObjects, row: int, truth: TrueObjects, true_row: int, alignment: Alignment
 ) -> dict[str, float | None]:
     """Compare one object's size, orientation and space with the truth's, as far as known."""
+    from scipy.spatial.transform import Rotation
+
     names = ("size_relative", "volume_ratio", "orientation_deg", "iou_3d")
     unknown: dict[str, float | None] = dict.fromkeys(names)
     if truth.size is None or not objects.is_ellipsoid[row]:

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from dqslam import _core
 
@@ -35,6 +34,8 @@ class Views:
 
 def inverted(poses: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the poses (..., 7) read as camera_from_world."""
+    from scipy.spatial.transform import Rotation
+
     flat = poses.reshape(-1, 7)
     turn = Rotation.from_quat(flat[:, 3:]).inv()
     return np.hstack([-turn.apply(flat[:, :3]), turn.as_quat()]).reshape(poses.shape)
@@ -45,6 +46,8 @@ def residuals(camera: _core.Camera, views: Views) -> NDArray[np.float64]:
 
     It is nan where a track is shorter, or its rays have no parallax.
     """
+    from scipy.spatial.transform import Rotation
+
     shape = views.there.shape
     focal = np.array([camera.fx, camera.fy])
     ideal = camera.undistort_points(views.middle.reshape(-1, 2)).reshape(*shape, 2)

@@ -27,7 +27,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from dqslam import _core
 from dqslam._checks import Bools, Floats, Ints
@@ -144,6 +143,8 @@ def _sizes(table: CsvTable) -> Floats | None:
 
 
 def _rotations(table: CsvTable) -> Floats | None:
+    from scipy.spatial.transform import Rotation
+
     if all(name in table for name in QUATERNION):
         xyzw = _columns(table, QUATERNION)
         off = np.abs(np.linalg.norm(xyzw, axis=1) - 1.0) > NORM_TOLERANCE

@@ -11,7 +11,6 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import Rotation
 
 from dqslam.io.files import FileError, read_rows, write_text
 from dqslam.io.formats import Format, Look
@@ -27,6 +26,8 @@ def read_kitti(
     path: str | Path, *, frames: FrameTimes | None = None, repeated_times: bool = False
 ) -> Trajectory:
     """Read a KITTI trajectory whose times are those of its ``frames``."""
+    from scipy.spatial.transform import Rotation
+
     rows, lines = read_rows(path)
     if frames is None:
         raise FileError(
@@ -55,6 +56,8 @@ def read_kitti(
 
 def write_kitti(path: str | Path, timestamps: ArrayLike, world_from_camera: ArrayLike) -> None:
     """Write poses (n, 7) as KITTI matrices; times have no place."""
+    from scipy.spatial.transform import Rotation
+
     poses = np.asarray(world_from_camera, dtype=float)
     matrices = np.empty((len(poses), 3, 4))
     matrices[:, :, :3] = Rotation.from_quat(poses[:, 3:]).as_matrix()
