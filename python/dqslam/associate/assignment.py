@@ -1,0 +1,56 @@
+"""Assign boxes of one image to objects: each box to one object at most, each object one box."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+# Stands for infinity, which the solver of the assignment refuses when nothing else is left.
+_FORBIDDEN = 1e9
+
+
+def assign(
+    cost: NDArray[np.float64], null: NDArray[np.float64]
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Choose the assignment of least total cost, and tell how sure each of its pairs is.
+
+    Parameters
+    ----------
+    cost
+        Of box i showing object j, shape (b, p); infinite where it cannot.
+    null
+        Of box i showing nothing of the map, shape (b,).
+
+    Returns
+    -------
+    column
+        Object of each box, -1 for none, shape (b,).
+    margin
+        By how much the total cost rises when that choice for the box is forbidden, shape (b,): the
+        joint ambiguity, all other boxes choosing anew.
+    """
+    from scipy.optimize import linear_sum_assignment
+
+    boxes, objects = cost.shape
+    column = np.full(boxes, -1)
+    margin = np.full(boxes, np.inf)
+    if not boxes or not objects:
+        return column, margin
+    table = np.full((boxes, objects + boxes), _FORBIDDEN)
+    table[:, :objects] = np.where(np.isfinite(cost), cost, _FORBIDDEN)
+    table[range(boxes), range(objects, objects + boxes)] = null
+    rows, chosen = linear_sum_assignment(table)
+    total = table[rows, chosen].sum()
+    column = np.where(chosen < objects, chosen, -1)
+    for row in range(boxes):
+        if np.isfinite(cost[row]).sum() + np.isfinite(cost[:, column[row]]).sum() < 3 and (
+            column[row] >= 0
+        ):
+            margin[row] = null[row] - cost[row, column[row]]
+            continue
+        if column[row] < 0 and not np.isfinite(cost[row]).any():
+            continue
+        other = table.copy()
+        other[row, chosen[row]] = _FORBIDDEN
+        margin[row] = other[linear_sum_assignment(other)].sum() - total
+    return column.astype(np.int64), margin

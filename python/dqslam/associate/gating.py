@@ -1,0 +1,146 @@
+"""Which object a box may show: predicted boxes, their covariance, and what each pairing costs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dqslam import _core
+from dqslam.recording import Detections
+
+# 99 % of the boxes of an object that is where the map says lie below this, by edges that count.
+CHI2_GATE = np.array([0.0, 6.63, 9.21, 11.34, 13.28])
+# A detector confuses classes, so no class is impossible.
+CONFUSED = 0.02
+_STEP = 1e-4
+
+
+def box_chi2(
+    camera: _core.Camera,
+    pose_model: _core.PoseModel,
+    poses: NDArray[np.float64],
+    ellipsoids: NDArray[np.float64],
+    boxes: Detections,
+    covariance: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Compare boxes with projected ellipsoids (m, 9) at poses (m, d): chi-square, 4 dof, (m,).
+
+    ``covariance`` [px^2] is that of the boxes, (m, 4, 4) and diagonal. An edge that the image cut
+    fits if the object reaches it. Infinite where the object is not in front of the camera.
+    """
+    predicted, in_front = _core.project_to_boxes(pose_model, camera, poses, ellipsoids)
+    error = predicted - boxes.box
+    beyond = np.where(error * [-1.0, -1.0, 1.0, 1.0] > 0.0, 0.0, error)
+    error = np.where(boxes.truncated, beyond, error)
+    variance = np.diagonal(covariance, axis1=1, axis2=2)
+    return np.where(in_front, np.sum(error**2 / variance, axis=1), np.inf)
+
+
+@dataclass(frozen=True)
+class PredictedBoxes:
+    """Boxes of objects as seen from one pose: all shown in front of the camera."""
+
+    object_row: NDArray[np.int64]
+    """Rows of the objects that the image shows, shape (p,)."""
+    box: NDArray[np.float64]
+    """Pixels, shape (p, 4)."""
+    covariance: NDArray[np.float64]
+    """Of pose and object together, without the detector's noise, pixels^2, shape (p, 4, 4)."""
+
+
+def predict_boxes(
+    camera: _core.Camera,
+    pose_model: _core.PoseModel,
+    pose: NDArray[np.float64],
+    ellipsoids: NDArray[np.float64],
+    covariance: NDArray[np.float64],
+) -> PredictedBoxes:
+    """Project objects (o, 9) into the image of a pose (d,).
+
+    ``covariance`` is that of the pose's tangent and all ellipsoids, jointly: (k + 9 o, k + 9 o).
+    """
+    count = len(ellipsoids)
+    k = len(covariance) - 9 * count
+    here = np.repeat(pose[None], count, axis=0)
+    box, in_front = _core.project_to_boxes(pose_model, camera, here, ellipsoids)
+    limits = np.array([-0.5, -0.5, camera.width - 0.5, camera.height - 0.5])
+    visible = np.minimum(box[:, 2:], limits[2:]) - np.maximum(box[:, :2], limits[:2])
+    shown = in_front & np.all(visible > 0, axis=1)
+    row = np.flatnonzero(shown)
+    if not row.size:
+        return PredictedBoxes(row, np.zeros((0, 4)), np.zeros((0, 4, 4)))
+    jacobian = _jacobian(camera, pose_model, here[row], ellipsoids[row], k)
+    own = np.concatenate(
+        [np.tile(np.arange(k), (len(row), 1)), k + 9 * row[:, None] + np.arange(9)], 1
+    )
+    joint = covariance[own[:, :, None], own[:, None, :]]
+    spread = jacobian @ joint @ jacobian.transpose(0, 2, 1)
+    return PredictedBoxes(row, box[row], spread)
+
+
+def _jacobian(
+    camera: _core.Camera,
+    pose_model: _core.PoseModel,
+    poses: NDArray[np.float64],
+    ellipsoids: NDArray[np.float64],
+    k: int,
+) -> NDArray[np.float64]:
+    """Differentiate boxes by the pose's tangent and the ellipsoid: (p, 4, k + 9)."""
+    count = len(poses)
+    all_poses, all_ellipsoids = [], []
+    for axis in range(k + 9):
+        for sign in (_STEP, -_STEP):
+            tangent = np.zeros((count, k))
+            shape = ellipsoids.copy()
+            if axis < k:
+                tangent[:, axis] = sign
+            else:
+                shape[:, axis - k] += sign
+            all_poses.append(_core.plus(pose_model, poses, tangent))
+            all_ellipsoids.append(shape)
+    box, _ = _core.project_to_boxes(
+        pose_model, camera, np.concatenate(all_poses), np.concatenate(all_ellipsoids)
+    )
+    box = box.reshape(k + 9, 2, count, 4)
+    return np.asarray(((box[:, 0] - box[:, 1]) / (2 * _STEP)).transpose(1, 2, 0))
+
+
+@dataclass(frozen=True)
+class PairCosts:
+    """What it costs to say that a box shows an object, and that it shows something else."""
+
+    cost: NDArray[np.float64]
+    """-2 ln of the likelihood, infinite outside of the gate, shape (b, p)."""
+    null: NDArray[np.float64]
+    """The same of a box that shows something else, shape (b,)."""
+
+
+def pair_costs(
+    camera: _core.Camera,
+    predicted: PredictedBoxes,
+    box: NDArray[np.float64],
+    box_covariance: NDArray[np.float64],
+    truncated: NDArray[np.bool_],
+    class_probability: NDArray[np.float64],
+) -> PairCosts:
+    """Compare boxes (b, 4) with predicted ones: ``d^2 + ln |2 pi S| - 2 ln p(class)``.
+
+    Edges that the image border cut take no part. ``class_probability`` (b, p) is that of the
+    box's class given the object. A box of something else may lie anywhere in the image and have
+    any size up to half of it.
+    """
+    cut = truncated[:, None, :]
+    error = np.where(cut, 0.0, box[:, None] - predicted.box)
+    # A cut edge: no error, and a variance that the determinant does not see.
+    spread = predicted.covariance + box_covariance[:, None]
+    spread = np.where(cut[..., :, None] | cut[..., None, :], 0.0, spread)
+    spread = spread + (cut / (2 * np.pi))[..., None] * np.eye(4)
+    d2 = np.sum(error * np.linalg.solve(spread, error[..., None])[..., 0], axis=-1)
+    log_det = np.linalg.slogdet(2 * np.pi * spread)[1]
+    edges = 4 - truncated.sum(axis=1)
+    inside = (d2 <= CHI2_GATE[edges][:, None]) & (edges > 0)[:, None]
+    cost = np.where(inside, d2 + log_det - 2 * np.log(class_probability), np.inf)
+    volume = (camera.width * camera.height) ** 2 / 4.0
+    return PairCosts(cost=cost, null=2 * np.log(volume) * edges / 4.0)

@@ -1,0 +1,139 @@
+"""Objects that are one, that moved, that are no objects: found by what their boxes say together."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dqslam.associate.scene_map import SceneMap
+
+# 99 % of chi-square with 3 degrees of freedom.
+SAME_PLACE = 11.34
+# Fitted centres of one box-shaped object, seen from two sides, differ by this part of its size.
+SIDES = 0.3
+# Share of the images of the rarer of two objects that may show both, by mistake.
+SEEN_TOGETHER = 0.1
+# Objects of a class, before it has a usual size.
+ENOUGH = 5
+# Logarithms of sizes within a class spread by at least this, and seldom by three times as much.
+LEAST_SPREAD = 0.15
+UNUSUAL = 3.0
+
+# An object moved when without it the path explains its boxes worse than this, and with it pays
+# this much: chi-squares a box.
+BENT = 13.28
+PAID = 2.0
+LEAST_BOXES = 8
+LEAVE_ONE_OUT_ITERATIONS = 8
+
+
+def join_duplicates(scene: SceneMap) -> None:
+    """Join objects of one class that may be in one place and are never seen together."""
+    alive = np.flatnonzero(scene.box_counts > 0)
+    alive = alive[~np.isin(alive, list(scene.left_out))]
+    pairs = _close_pairs(scene, alive)
+    if not pairs:
+        return
+    involved = np.unique(pairs)
+    involved, covariance = scene.joint_covariance(len(scene.poses) - 1, involved)
+    k = len(covariance) - 9 * len(involved)
+    size = np.exp(scene.log_sizes())
+    for kept, given_up in pairs:
+        if not np.all(np.isin([kept, given_up], involved)):
+            continue
+        if scene.box_counts[kept] == 0 or scene.box_counts[given_up] == 0:
+            continue
+        a, b = (k + 9 * np.searchsorted(involved, [kept, given_up])).tolist()
+        spread = _of_difference(covariance, a, b)
+        spread = spread + (SIDES * min(size[kept], size[given_up])) ** 2 * np.eye(3)
+        apart = scene.ellipsoids[kept, :3] - scene.ellipsoids[given_up, :3]
+        if apart @ np.linalg.solve(spread, apart) <= SAME_PLACE:
+            scene.join_objects(kept, given_up)
+
+
+def _close_pairs(scene: SceneMap, alive: NDArray[np.int64]) -> list[tuple[int, int]]:
+    """Return pairs of one class, a few sizes apart at most, that are not seen together."""
+    if len(alive) < 2:
+        return []
+    size = np.exp(scene.log_sizes()[alive])
+    center = scene.ellipsoids[alive, :3]
+    called = scene.votes[alive].argmax(axis=1)
+    distance = np.linalg.norm(center[:, None] - center, axis=2)
+    near = (distance < 4 * (size[:, None] + size)) & (called[:, None] == called)
+    poses = [scene.recording.detections.pose[scene.box_object == number] for number in alive]
+    pairs = []
+    for i, j in np.argwhere(np.triu(near, 1)).tolist():
+        together = len(np.intersect1d(poses[i], poses[j]))
+        if together <= SEEN_TOGETHER * min(len(poses[i]), len(poses[j])):
+            pairs.append((int(alive[i]), int(alive[j])))
+    return pairs
+
+
+def _of_difference(covariance: NDArray[np.float64], a: int, b: int) -> NDArray[np.float64]:
+    """Return the covariance of the difference of two points, at rows a and b of a joint one."""
+    first, second = slice(a, a + 3), slice(b, b + 3)
+    cross = covariance[first, second]
+    return np.asarray(covariance[first, first] + covariance[second, second] - cross - cross.T)
+
+
+def _usual(values: NDArray[np.float64]) -> tuple[float, float]:
+    """Return the middle of the shortest half of some numbers, and a standard deviation from it.
+
+    Nearly half of them may be wrong (Rousseeuw & Leroy 1987: the shorth).
+    """
+    values = np.sort(values)
+    half = len(values) // 2
+    first = int(np.argmin(values[half:] - values[: len(values) - half]))
+    low, high = float(values[first]), float(values[first + half])
+    return 0.5 * (low + high), 0.5 * (high - low) / 0.6745
+
+
+def find_misfits(scene: SceneMap) -> dict[int, str]:
+    """Return objects whose size is unusual for their class, and how.
+
+    What moves along a straight line while the camera does looks like a thing at rest, at another
+    distance, hence of another size: of cars that come towards us, about half.
+    """
+    alive = np.flatnonzero(scene.box_counts > 0)
+    log_size = scene.log_sizes()
+    called = scene.votes.argmax(axis=1)
+    misfits = {}
+    for one in np.unique(called[alive]):
+        members = alive[called[alive] == one]
+        if len(members) < ENOUGH:
+            continue
+        usual, spread = _usual(log_size[members])
+        for number in members.tolist():
+            ratio = log_size[number] - usual
+            if abs(ratio) > UNUSUAL * max(spread, LEAST_SPREAD):
+                misfits[number] = (
+                    f"its size is {np.exp(ratio):.2g} times the usual one of its class: "
+                    "it moved while it was seen, or is something else"
+                )
+    return misfits
+
+
+def find_movers(scene: SceneMap) -> dict[int, str]:
+    """Return objects that are at rest only if the path bends to them.
+
+    Each in turn is left out of the estimate. If it moved, its boxes do not fit any place then, and
+    the cost that it causes, to the path and to the other objects as well, is gone.
+    """
+    movers = {}
+    with_all = scene.cost(max_iterations=LEAVE_ONE_OUT_ITERATIONS)
+    alive = np.flatnonzero(scene.box_counts >= LEAST_BOXES)
+    for number in alive[~np.isin(alive, list(scene.left_out))].tolist():
+        rows = np.flatnonzero(scene.box_object == number)
+        without = scene.cost(max_iterations=LEAVE_ONE_OUT_ITERATIONS, without=number)
+        paid = 2.0 * (with_all.cost - without.cost) / len(rows)
+        if paid < PAID:
+            continue
+        with scene.at(without.poses):
+            ellipsoids, _ = scene.fit_groups([rows])
+            fit = scene.chi2(rows, np.tile(ellipsoids, (len(rows), 1)), blur=0.0)
+        if np.median(fit) > BENT:
+            movers[number] = (
+                f"without it, the path explains its boxes {np.median(fit):.0f} times worse than "
+                "chance: it moved"
+            )
+    return movers

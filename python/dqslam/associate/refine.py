@@ -1,0 +1,69 @@
+"""Association with the whole path known: estimate, assign all boxes again, judge, and repeat."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from dqslam.associate.births import FEWEST_VIEWS
+from dqslam.associate.follow import Follower, choose, predict
+from dqslam.associate.judge import find_misfits, find_movers, join_duplicates
+from dqslam.associate.scene_map import SceneMap
+
+ROUNDS = 3
+MAX_ITERATIONS = 50
+# The noise is settled when its level changes by less, as a logarithm, or after so many times.
+SETTLED = 0.05
+MOST_CORRECTIONS = 6
+# -2 ln of the odds, 3 to 1: with the whole path known, waiting helps no more.
+AMBIGUOUS = 2.0
+
+
+def refine(follower: Follower, progress: Callable[[float], None]) -> None:
+    """Make the map agree with itself; ``progress`` is told the share that is done."""
+    scene = follower.scene
+    for done in range(ROUNDS):
+        settle(scene)
+        reassign(scene, follower.bonus)
+        for number in np.flatnonzero(scene.box_counts < FEWEST_VIEWS).tolist():
+            scene.give_up(number)
+        follower.give_birth()
+        if not follower.final:
+            join_duplicates(scene)
+        scene.left_out = find_misfits(scene)
+        scene.left_out |= find_movers(scene)
+        progress((done + 1) / ROUNDS)
+    settle(scene)
+
+
+def settle(scene: SceneMap) -> None:
+    """Estimate, and correct the level of the odometry's noise, until that changes no more."""
+    for _ in range(MOST_CORRECTIONS):
+        scene.estimate(max_iterations=MAX_ITERATIONS)
+        if scene.estimate_noise() < SETTLED:
+            break
+
+
+def reassign(scene: SceneMap, bonus: float) -> None:
+    """Assign all boxes again, those that waited too, each image by itself."""
+    detections = scene.recording.detections
+    alive = np.flatnonzero(scene.box_counts > 0)
+    k = scene.recording.odometry.covariance.shape[1]
+    # What was uncertain has been fitted to these very boxes.
+    certain = np.zeros((k + 9 * len(alive),) * 2)
+    found = np.full(len(detections), -1)
+    order = np.argsort(detections.pose, kind="stable")
+    poses, starts = np.unique(detections.pose[order], return_index=True)
+    for pose, rows in zip(poses.tolist(), np.split(order, starts[1:]), strict=True):
+        predicted = predict(scene, pose, alive, certain)
+        choice, margin = choose(scene, rows, alive, predicted, bonus)
+        found[rows] = np.where(margin >= AMBIGUOUS, choice, -1)
+    scene.release_all()
+    scene.claim(np.arange(len(found)), found)
+    claimed = np.flatnonzero(found >= 0)
+    pairs, counts = np.unique(
+        np.column_stack([scene.tracklet[claimed], found[claimed]]), axis=0, return_counts=True
+    )
+    for row in np.argsort(counts, kind="stable"):  # the most frequent comes last, and stays
+        scene.object_of_tracklet[int(pairs[row, 0])] = int(pairs[row, 1])

@@ -1,0 +1,98 @@
+"""Recordings with fewer poses, and back: odometry composed, its noise carried on, gaps filled."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dqslam import _core
+from dqslam.recording import Recording
+
+
+def thin_recording(recording: Recording, keyframes: NDArray[np.int64]) -> Recording:
+    """Keep some of the poses and their boxes; odometry between them is composed."""
+    odometry, detections = recording.odometry, recording.detections
+    model = odometry.pose_model
+    path = _core.dead_reckon(model, odometry.first_pose, odometry.relative)
+    row = np.full(len(path), -1)
+    row[keyframes] = np.arange(len(keyframes))
+    kept = detections.select(row[detections.pose] >= 0)
+    return replace(
+        recording,
+        timestamps=recording.timestamps[keyframes],
+        odometry=replace(
+            odometry,
+            first_pose=path[keyframes[0]],
+            relative=_core.between(model, path[keyframes[:-1]], path[keyframes[1:]]),
+            covariance=compose_covariance(recording, odometry.covariance, keyframes),
+        ),
+        detections=replace(kept, pose=row[kept.pose]),
+    )
+
+
+def compose_covariance(
+    recording: Recording, covariance: NDArray[np.float64], keyframes: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """Return the covariance of the motion between keyframes from that of each step, (s, k, k).
+
+    As many as there are keyframes, less one: shape (n - 1, k, k).
+    """
+    odometry = recording.odometry
+    path = _core.dead_reckon(odometry.pose_model, odometry.first_pose, odometry.relative)
+    ends = np.repeat(keyframes[1:], np.diff(keyframes))
+    steps = np.arange(keyframes[0], keyframes[-1])
+    after = _core.between(odometry.pose_model, path[steps + 1], path[ends])
+    moved = transport(odometry.pose_model, after)
+    spread = moved @ covariance[steps] @ moved.transpose(0, 2, 1)
+    return np.asarray(np.add.reduceat(spread, keyframes[:-1] - keyframes[0], axis=0))
+
+
+def transport(model: _core.PoseModel, relative: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return what a small change of a pose is for the pose that follows it, shape (n, k, k).
+
+    For poses b_in_a (n, d): ``(a (+) x) o b_in_a = (a o b_in_a) (+) M x`` to first order.
+    """
+    if model == _core.PoseModel.SE2:
+        c, s = np.cos(relative[:, 2]), np.sin(relative[:, 2])
+        matrix = np.zeros((len(relative), 3, 3))
+        matrix[:, :2, :2] = np.stack([np.stack([c, s], -1), np.stack([-s, c], -1)], -2)
+        lever = np.stack([-relative[:, 1], relative[:, 0]], -1)
+        matrix[:, :2, 2] = np.einsum("nij,nj->ni", matrix[:, :2, :2], lever)
+        matrix[:, 2, 2] = 1.0
+        return matrix
+    from scipy.spatial.transform import Rotation
+
+    turned = Rotation.from_quat(relative[:, 3:]).as_matrix().transpose(0, 2, 1)
+    x, y, z = relative[:, :3].T
+    zero = np.zeros_like(x)
+    # x r = -[t] r: the rotation of a moves b by the cross product.
+    lever = np.stack(
+        [np.stack([zero, z, -y], -1), np.stack([-z, zero, x], -1), np.stack([y, -x, zero], -1)], -2
+    )
+    matrix = np.zeros((len(relative), 6, 6))
+    matrix[:, :3, :3] = matrix[:, 3:, 3:] = turned
+    matrix[:, :3, 3:] = turned @ lever
+    return matrix
+
+
+def fill_in(
+    recording: Recording, keyframes: NDArray[np.int64], poses: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return all poses (n, d) from those of the keyframes: odometry, its errors shared evenly."""
+    odometry = recording.odometry
+    model = odometry.pose_model
+    path = _core.dead_reckon(model, odometry.first_pose, odometry.relative)
+    part = np.searchsorted(keyframes, np.arange(len(path)), side="right") - 1
+    part = part.clip(min=0)
+    first = keyframes[part]
+    last = keyframes[(part + 1).clip(max=len(keyframes) - 1)]
+    ahead = _core.compose(model, poses[part], _core.between(model, path[first], path))
+    # What is left at the next keyframe, carried back to where we are.
+    to_next = _core.between(model, path, path[last])
+    next_key = poses[(part + 1).clip(max=len(keyframes) - 1)]
+    missed = _core.minus(model, next_key, _core.compose(model, ahead, to_next))
+    back = np.linalg.solve(transport(model, to_next), missed[:, :, None])[:, :, 0]
+    share = (np.arange(len(path)) - first) / np.maximum(last - first, 1)
+    return _core.plus(model, ahead, back * share[:, None])
