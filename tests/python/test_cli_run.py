@@ -36,6 +36,7 @@ def test_writes_what_it_says(files, orbit, capsys):
     assert call(files, *PERTURB, "--seed", "1", "--ids", "class_id") == 0
     out = files[0].parent / "out"
     assert sorted(path.name for path in out.iterdir()) == [
+        "boxes.csv",
         "camera.json",
         "map.json",
         "odometry.txt",

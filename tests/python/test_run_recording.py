@@ -11,10 +11,8 @@ from dqslam.problem import BoxNoise, build_graph, solve
 from dqslam.run_recording import (
     box_chi2,
     cut_edges,
-    default_options,
     perturb_odometry,
     run,
-    scene_size_prior,
     with_cut_edges,
 )
 from dqslam.size_prior import SizePrior, SizePriors
@@ -154,7 +152,7 @@ def test_boxes_meet_the_nearest_pose(files, orbit):
         ({"min_score": 0.95}, r"boxes\.csv: no object is left of 160 boxes: 160 below"),
         ({"min_score": 1.5}, "min_score is 1.5, not between 0 and 1"),
         ({"min_score": float("nan")}, "min_score is nan"),
-        ({"ids": "name"}, "ids is 'name', not 'track_id' or 'class_id'"),
+        ({"ids": "name"}, "ids is 'name', not 'track_id', 'class_id' or 'none'"),
         ({"max_time_difference": -1.0}, "max_time_difference is -1, negative"),
     ],
 )
@@ -213,34 +211,6 @@ def test_perturbation_is_repeatable_and_starts_at_the_same_pose(files):
 def test_sigmas_must_make_sense(sigma):
     with pytest.raises(ValueError, match="odometry noise: rotation is .*, not between"):
         OdometryNoise(0.1, sigma)
-
-
-# --- size prior
-
-
-@pytest.mark.parametrize("scale", [0.01, 1.0, 100.0])
-def test_size_prior_follows_the_scale_of_the_scene(tmp_path, orbit, scale):
-    scaled = make_orbit(noise_px=1.0)
-    scaled.poses[:, :3] *= scale
-    recording, _ = load_recording(*write_orbit(tmp_path, scaled))
-    prior = scene_size_prior(recording)
-    true = np.median([np.prod(axes) ** (1 / 3) for axes in orbit.semi_axes.values()])
-    assert np.exp(prior.log_mean) == pytest.approx(true * scale, rel=0.15)
-
-
-def test_size_prior_survives_noisy_odometry(files):
-    recording, _ = load_recording(*files)
-    exact = scene_size_prior(recording).log_mean
-    for seed in range(5):
-        noisy = perturb_odometry(recording, NOISE, seed=seed)
-        assert scene_size_prior(noisy).log_mean == pytest.approx(exact, abs=0.3)
-
-
-def test_size_prior_without_parallax_is_the_default(tmp_path, orbit):
-    still = make_orbit()
-    still.poses[:] = still.poses[0]
-    recording, _ = load_recording(*write_orbit(tmp_path, still))
-    assert np.isfinite(scene_size_prior(recording).log_mean)
 
 
 # --- the whole
@@ -398,8 +368,8 @@ def test_boxes_cut_by_the_image_do_not_bend_the_map(tmp_path):
         return np.linalg.norm(found.centers - true, axis=1).max()
 
     aware = run(recording, mode=_core.Mode.MAPPING).estimate
-    prior = scene_size_prior(recording)
-    options = default_options(_core.Mode.MAPPING, _core.Schedule.BATCH)
+    options = _core.SolveOptions(mode=_core.Mode.MAPPING, loss=_core.Loss.CAUCHY)
+    prior = SizePrior(np.log(0.1), 0.7)
     blind, _ = solve(build_graph(recording, size_prior=prior), options)
     assert worst(aware) < 0.01
     assert worst(aware) < 0.5 * worst(blind)
@@ -420,5 +390,5 @@ def test_reference_in_another_frame_and_rate(files, orbit):
 
 def test_reference_of_another_time(files, orbit):
     recording, _ = load_recording(*files)
-    with pytest.raises(ValueError, match="groundtruth: 0 poses within 0.05 s of the odometry's"):
+    with pytest.raises(ValueError, match="groundtruth: 0 poses within 0.05 s of the estimate's"):
         run(recording, reference=Trajectory(orbit.times + 1000, orbit.poses))

@@ -6,23 +6,50 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from dqslam.cli.progress import show_share
+
 if TYPE_CHECKING:
     from rich.table import Table
 
     from dqslam.io import OdometryNoise
 
 NOISE = "translation=0.02,rotation=0.01"
+# Of tracklets that are linked in the image: 1 in 10 goes over to another object.
+UNSURE = 0.9
 
 
 def run(
-    camera: Annotated[Path, typer.Option(help="JSON or TOML: fx fy cx cy width height k1 ...")],
-    odometry: Annotated[Path, typer.Option(help="TUM trajectory, world_from_camera.")],
-    detections: Annotated[Path, typer.Option(help="CSV: frame,timestamp,x1,y1,x2,y2,...")],
+    camera: Annotated[Path, typer.Option(help="Camera: JSON, TOML, ROS, COLMAP, KITTI, bag.")],
+    odometry: Annotated[Path, typer.Option(help="Trajectory: TUM, KITTI, EuRoC, bag.")],
+    detections: Annotated[Path, typer.Option(help="Boxes: CSV, COCO, YOLO, MOT, bag.")],
     out: Annotated[Path, typer.Option(help="Directory of the results.")],
     min_score: Annotated[float, typer.Option(help="Leave out boxes with a lower score.")] = 0.5,
+    formats: Annotated[
+        list[str] | None,
+        typer.Option("--format", metavar="NAME", help="Of a file, where its look does not tell."),
+    ] = None,
+    frame_times: Annotated[
+        Path | None, typer.Option(help="Times of frames: KITTI times.txt, TUM rgb.txt, frames.csv.")
+    ] = None,
+    frame_rate: Annotated[
+        float | None, typer.Option(metavar="HZ", help="Or frames a second, frame 0 at 0 s.")
+    ] = None,
     ids: Annotated[
-        Literal["track_id", "class_id"], typer.Option(help="The column that tells objects apart.")
+        Literal["none", "track_id", "class_id"],
+        typer.Option(
+            help="What tells objects apart: nothing yet, the column of a tracker, or the class, "
+            "where each occurs once."
+        ),
     ] = "track_id",
+    trust_ids: Annotated[
+        float,
+        typer.Option(
+            min=0.5,
+            max=1.0,
+            help="Probability that an id stays with its object; 1: ids are final, below: boxes "
+            "without ids take part, ids are cut and joined.",
+        ),
+    ] = 1.0,
     mode: Annotated[
         Literal["slam", "mapping"], typer.Option(help="mapping: the odometry is the truth.")
     ] = "slam",
@@ -30,13 +57,13 @@ def run(
         str | None,
         typer.Option(metavar="NOISE", help=f'Add noise to every step (m, rad): "{NOISE}".'),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of that noise.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Of that noise, and of the boxes held out.")] = 0,
     odometry_noise: Annotated[
         str | None,
         typer.Option(
             metavar="NOISE",
             help="What to believe of every step, likewise. Default: the noise that was added, "
-            'else "translation=0.01,rotation=0.005".',
+            "else its level is estimated from the boxes.",
         ),
     ] = None,
     groundtruth: Annotated[
@@ -48,6 +75,10 @@ def run(
             help="TOML table of sizes by class. Default: one size for all, from the recording."
         ),
     ] = None,
+    hold_out: Annotated[
+        float,
+        typer.Option(min=0.0, max=0.99, help="Share of boxes that the map is tested on instead."),
+    ] = 0.0,
     max_time_difference: Annotated[
         float | None,
         typer.Option(help="Seconds from a box to its pose. Default: half the interval of poses."),
@@ -55,34 +86,51 @@ def run(
 ) -> None:
     """Estimate the trajectory and the objects of a recording.
 
-    Writes trajectory.txt, odometry.txt (what it started from), map.json and report.json.
+    Writes trajectory.txt, odometry.txt (what it started from), map.json, boxes.csv, camera.json
+    and report.json.
     """
     from dqslam import _core, io, run_recording
     from dqslam.size_prior import load_size_priors
 
     sizes = None if size_priors is None else load_size_priors(size_priors)
     added = parse_noise("--perturb-odometry", perturb_odometry)
-    believed = parse_noise("--odometry-noise", odometry_noise) or added or io.OdometryNoise()
+    believed = parse_noise("--odometry-noise", odometry_noise) or added
+    final = trust_ids == 1.0 and ids != "none"
+    names = io.split_formats(formats or [])
+    frames = io.choose_frame_times(odometry, detections, names, times=frame_times, rate=frame_rate)
     reference, reference_name = None, None
     if groundtruth is not None:
         reference, reference_name = io.read_trajectory(groundtruth, repeated_times=True), "file"
     elif added is not None:
-        reference, reference_name = io.read_trajectory(odometry), "odometry before the added noise"
+        reference = io.read_trajectory(odometry, names.trajectory, frames=frames)
+        reference_name = "odometry before the added noise"
     recording, dropped = io.load_recording(
         camera,
         odometry,
         detections,
         min_score=min_score,
         ids=ids,
+        final_ids=final,
         max_time_difference=max_time_difference,
         odometry_noise=believed,
+        formats=names,
+        frames=frames,
     )
     if added is not None:
         recording = run_recording.perturb_odometry(recording, added, seed=seed, believed=believed)
     out.mkdir(parents=True, exist_ok=True)
-    result = run_recording.run(
-        recording, mode=_core.Mode[mode.upper()], reference=reference, size_prior=sizes
-    )
+    with show_share("estimating") as progress:
+        result = run_recording.run(
+            recording,
+            trust_ids=1.0 if final else min(trust_ids, UNSURE),
+            mode=_core.Mode[mode.upper()],
+            reference=reference,
+            size_prior=sizes,
+            estimates_noise=believed is None,
+            hold_out=hold_out,
+            seed=seed,
+            progress=progress,
+        )
     report = {
         "camera": str(camera),
         "odometry": str(odometry),
@@ -90,13 +138,20 @@ def run(
         "groundtruth": None if groundtruth is None else str(groundtruth),
         "min_score": min_score,
         "ids": ids,
+        "trust_ids": None if ids == "none" else trust_ids,
         "odometry_noise_added": None if added is None else asdict(added) | {"seed": seed},
-        "odometry_noise_believed": asdict(believed),
+        "odometry_noise_believed": None if believed is None else asdict(believed),
         "dropped_boxes": asdict(dropped),
         "reference": reference_name,
         **result.report,
     }
-    io.save_estimate(result.estimate, out)
+    io.save_estimate(
+        result.estimate,
+        out,
+        detections=result.detections,
+        held_out=result.held_out,
+        marginals=result.marginals,
+    )
     io.write_json(out / "report.json", report)
     _show(report, out)
 
@@ -125,16 +180,27 @@ def _show(report: dict[str, Any], out: Path) -> None:
 
     console = Console()
     console.print(_overview(report))
-    console.print(_objects(report["objects"]))
-    solver = report["solver"]
-    console.print(
+    if report["objects"]:
+        console.print(_objects(report["objects"]))
+    lines = [f"object {name} is not in the map: {why}" for name, why in _dropped(report)]
+    lines += [f"under-constrained: {sentence}" for sentence in report["under_constrained"]]
+    if report["solver"] is None:
+        lines.append("no object fits a world at rest: the trajectory is the odometry")
+    else:
+        lines.append(_solver(report["solver"]))
+    for line in [*lines, f"wrote {out}"]:
+        console.print(line, markup=False, highlight=False, soft_wrap=True)
+
+
+def _dropped(report: dict[str, Any]) -> list[tuple[str, str]]:
+    return sorted(report["dropped_objects"].items(), key=lambda item: int(item[0]))
+
+
+def _solver(solver: dict[str, Any]) -> str:
+    return (
         f"solver: {solver['message']} ({solver['iterations']} iterations, "
-        f"{solver['rejected_steps']} rejected, {solver['seconds']:.2f} s)",
-        markup=False,
-        highlight=False,
-        soft_wrap=True,
+        f"{solver['rejected_steps']} rejected, {solver['seconds']:.2f} s)"
     )
-    console.print(f"wrote {out}", markup=False, highlight=False, soft_wrap=True)
 
 
 def _overview(report: dict[str, Any]) -> "Table":
@@ -143,14 +209,20 @@ def _overview(report: dict[str, Any]) -> "Table":
 
     boxes = report["boxes"]
     table = Table(box=SIMPLE_HEAD, show_header=False)
-    table.add_row("poses", str(report["poses"]))
-    table.add_row("boxes", f"{boxes['count']} of {len(report['objects'])} objects")
-    table.add_row("left out", _left_out(report["dropped_boxes"], report["ids"]))
+    table.add_row("poses", f"{report['poses']}, {report['keyframes']} of them keyframes")
     table.add_row(
-        "chi-square of a box",
-        f"median {boxes['chi2_median']:.2f} (3.36 expected); {boxes['outlier_share']:.1%} do not "
-        f"fit (above 13.28), {boxes['not_in_front']} of them not even in front",
+        "boxes",
+        f"{boxes['count']} of {len(report['objects'])} objects, {boxes['unassigned']} of none",
     )
+    table.add_row("left out", _left_out(report["dropped_boxes"], report["ids"]))
+    if boxes["count"]:
+        table.add_row(
+            "chi-square of a box",
+            f"median {boxes['chi2_median']:.2f} (3.36 expected); {boxes['outlier_share']:.1%} do "
+            f"not fit (above 13.28), {boxes['not_in_front']} of them not even in front",
+        )
+    table.add_row("re-projection", _reprojection(report["reprojection"]))
+    table.add_row("odometry noise", _noise(report["odometry_noise"]))
     error = report["trajectory_error"]
     if error is None:
         table.add_row("trajectory error", "unknown: there is nothing to compare with")
@@ -160,6 +232,25 @@ def _overview(report: dict[str, Any]) -> "Table":
         word = "better" if after < before else "worse" if after > before else "unchanged"
         table.add_row(title, f"odometry {before:.4f} m, estimate {after:.4f} m: {word}")
     return table
+
+
+def _reprojection(overlap: dict[str, Any]) -> str:
+    if overlap["iou_median"] is None:
+        return "no box shows an object of the map"
+    which = "held out" if overlap["held_out"] else "used"
+    return (
+        f"median IoU {overlap['iou_median']:.2f} of the boxes {which}; "
+        f"{overlap['explained_share']:.0%} of those of mapped classes reach 0.5"
+    )
+
+
+def _noise(noise: dict[str, Any]) -> str:
+    if noise["from"] == "given":
+        return "given"
+    return (
+        f"estimated: {1e3 * noise['translation_m']:.2f} mm, "
+        f"{1e3 * noise['rotation_rad']:.2f} mrad a step"
+    )
 
 
 def _left_out(dropped: dict[str, Any], ids: str) -> str:

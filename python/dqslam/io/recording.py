@@ -13,6 +13,8 @@ from dqslam import _core
 from dqslam.io.camera import read_camera
 from dqslam.io.detections import DetectionTable, read_detections
 from dqslam.io.files import FileError
+from dqslam.io.frames import FrameTimes
+from dqslam.io.sources import FormatNames
 from dqslam.io.trajectory import read_trajectory
 from dqslam.recording import Detections, Odometry, Recording
 
@@ -21,7 +23,7 @@ FEWEST_BOXES = 3
 # Odometry outside of this is exact or worthless, and squares badly.
 SIGMAS = (1e-9, 1e6)
 
-Ids = Literal["track_id", "class_id"]
+Ids = Literal["none", "track_id", "class_id"]
 
 
 @dataclass(frozen=True)
@@ -70,45 +72,62 @@ def load_recording(
     *,
     min_score: float = 0.5,
     ids: Ids = "track_id",
+    final_ids: bool = True,
     max_time_difference: float | None = None,
     odometry_noise: OdometryNoise | None = None,
+    formats: FormatNames | None = None,
+    frames: FrameTimes | None = None,
 ) -> tuple[Recording, Dropped]:
     """Read a recording in SE(3), the robot being the camera, and what had to be left out of it.
 
     Parameters
     ----------
     camera, odometry, detections
-        Files: JSON or TOML; a TUM trajectory, world_from_camera; CSV.
+        Files in any of the formats that ``read_camera``, ``read_trajectory`` and
+        ``read_detections`` know.
     min_score
         Boxes with a lower score are left out.
     ids
-        The column that tells which boxes show the same object.
+        The column that tells which boxes show the same object; "none" leaves that open.
+    final_ids
+        Whether these ids are believed: a box without one is left out then, as are the lesser of
+        two boxes with one id in an image, and ids of fewer than 3 boxes.
     max_time_difference
         A box belongs to the nearest pose in time, if that is within this many seconds; by default
         half the median interval between poses.
     odometry_noise
         The uncertainty of one step, which trajectory files do not carry.
+    formats
+        Names of the formats, where files do not look like what they are.
+    frames
+        Times of the frames, for files that only count them: see ``choose_frame_times``.
     """
     if not 0 <= min_score <= 1:
         raise ValueError(f"min_score is {min_score:g}, not between 0 and 1")
     if max_time_difference is not None and not max_time_difference >= 0:
         raise ValueError(f"max_time_difference is {max_time_difference:g}, negative")
-    lens = read_camera(camera)
-    times, path = read_trajectory(odometry)
+    names = formats or FormatNames()
+    lens = read_camera(camera, names.camera)
+    times, path = read_trajectory(odometry, names.trajectory, frames=frames)
     if len(times) < 2:
         raise FileError(odometry, "one pose only: nothing moves")
-    table = read_detections(detections, width=lens.width, height=lens.height)
+    table = read_detections(
+        detections, names.detections, width=lens.width, height=lens.height, frames=frames
+    )
     object_id = _object_ids(table, ids)
     pose, late = nearest_pose(times, table.timestamp)
     tolerance = 0.5 * float(np.median(np.diff(times)))
     if max_time_difference is not None:
         tolerance = max_time_difference
-    rows, dropped = _select(table.score, object_id, pose, late, min_score, tolerance)
+    final = final_ids and ids != "none"
+    rows, dropped = (_select if final else _select_images)(
+        table, object_id, pose, late, min_score, tolerance
+    )
     if not rows.size:
         raise FileError(detections, _nothing_left(table, dropped, ids, tolerance, times))
     model = _core.PoseModel.SE3
     noise = odometry_noise or OdometryNoise()
-    names = dict(zip(table.class_id.tolist(), table.class_name, strict=True))
+    classes = dict(zip(table.class_id.tolist(), table.class_name, strict=True))
     recording = Recording(
         camera=lens,
         timestamps=times,
@@ -124,7 +143,7 @@ def load_recording(
             score=table.score[rows],
             class_id=table.class_id[rows],
             object_id=object_id[rows],
-            class_names={number: name or str(number) for number, name in names.items()},
+            class_names={number: name or str(number) for number, name in classes.items()},
         ),
         positions=None,
     )
@@ -153,15 +172,17 @@ def _undistorted(
                 lens.undistort_boxes(table.box[row : row + 1])
             except ValueError:
                 message = f"the distortion in {camera} has no inverse at this box"
-                raise FileError(table.path, message, int(table.line[row])) from None
+                raise table.error(int(row), message) from None
         raise
 
 
 def _object_ids(table: DetectionTable, ids: Ids) -> NDArray[np.int64]:
+    if ids == "none":
+        return np.full(len(table), -1, dtype=np.int64)
     if ids == "class_id":
         return table.class_id
     if ids != "track_id":
-        raise ValueError(f"ids is {ids!r}, not 'track_id' or 'class_id'")
+        raise ValueError(f"ids is {ids!r}, not 'track_id', 'class_id' or 'none'")
     if table.track_id is None:
         message = f"no column track_id (it has: {', '.join(table.columns)})"
         raise FileError(table.path, message, 1)
@@ -169,7 +190,7 @@ def _object_ids(table: DetectionTable, ids: Ids) -> NDArray[np.int64]:
 
 
 def _select(
-    score: NDArray[np.float64],
+    table: DetectionTable,
     object_id: NDArray[np.int64],
     pose: NDArray[np.int64],
     late: NDArray[np.float64],
@@ -177,6 +198,7 @@ def _select(
     tolerance: float,
 ) -> tuple[NDArray[np.int64], Dropped]:
     """Choose rows: one box an object and pose, at least 3 an object; in order of pose, object."""
+    score = table.score
     scored = score >= min_score
     named = scored & (object_id >= 0)
     timely = named & (late <= tolerance)
@@ -195,6 +217,31 @@ def _select(
         few_boxes=dict(zip(objects[few].tolist(), counts[few].tolist(), strict=True)),
     )
     return best[~np.isin(object_id[best], objects[few])], dropped
+
+
+def _select_images(
+    table: DetectionTable,
+    object_id: NDArray[np.int64],
+    pose: NDArray[np.int64],
+    late: NDArray[np.float64],
+    min_score: float,
+    tolerance: float,
+) -> tuple[NDArray[np.int64], Dropped]:
+    """Choose rows: all boxes of the image that is nearest in time to each pose; in their order."""
+    scored = table.score >= min_score
+    timely = scored & (late <= tolerance)
+    rows = np.flatnonzero(timely)
+    rows = rows[np.lexsort((rows, late[rows], pose[rows]))]
+    _, first, group = np.unique(pose[rows], return_index=True, return_inverse=True)
+    chosen = rows[table.frame[rows] == table.frame[rows[first]][group.reshape(-1)]]
+    dropped = Dropped(
+        below_min_score=int(np.sum(~scored)),
+        without_id=0,
+        without_pose=int(np.sum(scored & ~timely)),
+        repeated=len(rows) - len(chosen),
+        few_boxes={},
+    )
+    return chosen, dropped
 
 
 def _nothing_left(

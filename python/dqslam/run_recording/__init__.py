@@ -1,10 +1,8 @@
 """Real recordings: what is assumed of them, their estimate, and what can be said about it."""
 
-from dqslam.run_recording.assumptions import cut_edges as cut_edges
-from dqslam.run_recording.assumptions import scene_size_prior as scene_size_prior
-from dqslam.run_recording.assumptions import with_cut_edges as with_cut_edges
+from dqslam.run_recording.border import cut_edges as cut_edges
+from dqslam.run_recording.border import with_cut_edges as with_cut_edges
 from dqslam.run_recording.pipeline import RunResult as RunResult
-from dqslam.run_recording.pipeline import default_options as default_options
 from dqslam.run_recording.pipeline import perturb_odometry as perturb_odometry
 from dqslam.run_recording.pipeline import run as run
 from dqslam.run_recording.report import box_chi2 as box_chi2

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dqslam import _core
+from dqslam.associate import CHI2_GATE, Association, associate, fill_in
 from dqslam.estimate import Estimate
+from dqslam.evaluate_results import common_poses
 from dqslam.io import OdometryNoise, Trajectory
-from dqslam.problem import BoxNoise, Graph, build_graph, solve
-from dqslam.recording import Recording
-from dqslam.run_recording.assumptions import scene_size_prior, with_cut_edges
+from dqslam.problem import BoxNoise, solve
+from dqslam.recording import Detections, Recording
+from dqslam.run_recording.border import with_cut_edges
+from dqslam.run_recording.hold_out import choose_held_out, describe_overlap, overlap_with_map
 from dqslam.run_recording.report import (
     box_chi2,
     describe_boxes,
@@ -22,35 +27,23 @@ from dqslam.run_recording.report import (
     trajectory_error,
 )
 from dqslam.size_prior import SizePrior, SizePriors
-
-GROW_STEPS = 60
+from dqslam.uncertainty import Marginals, marginal_covariances
 
 
 @dataclass(frozen=True)
 class RunResult:
-    """An estimate, how the solver got there, and its report, ready for JSON."""
+    """An estimate, what it was made from, and its report, ready for JSON."""
 
     estimate: Estimate
-    summary: _core.Summary
+    detections: Detections
+    """All boxes, with the ids of the objects that they show; -1 for none, or held out."""
+    held_out: NDArray[np.bool_]
+    """Which boxes were kept from the estimator, shape (m,)."""
+    marginals: Marginals | None
+    """Covariances of keyframes and mapped objects; None without objects."""
+    summary: _core.Summary | None
+    """How the solver got there; None without objects."""
     report: dict[str, Any]
-
-
-def default_options(
-    mode: _core.Mode = _core.Mode.SLAM,
-    schedule: _core.Schedule = _core.Schedule.GROW,
-    poses: int = 0,
-) -> _core.SolveOptions:
-    """Choose the estimator for real detectors: outliers are many, so the loss is Cauchy's.
-
-    A path of many ``poses`` grows by more of them at a time: at most GROW_STEPS additions.
-    """
-    options = _core.SolveOptions()
-    options.mode = mode
-    options.schedule = schedule
-    options.loss = _core.Loss.CAUCHY
-    options.loss_scale = 2.0
-    options.grow_poses = max(options.grow_poses, -(-poses // GROW_STEPS))
-    return options
 
 
 def perturb_odometry(
@@ -76,65 +69,142 @@ def perturb_odometry(
 def run(
     recording: Recording,
     *,
+    trust_ids: float = 1.0,
     mode: _core.Mode = _core.Mode.SLAM,
     reference: Trajectory | None = None,
     box_noise: BoxNoise | None = None,
     size_prior: SizePrior | SizePriors | None = None,
-    options: _core.SolveOptions | None = None,
+    estimates_noise: bool = False,
+    hold_out: float = 0.0,
+    seed: int = 0,
+    progress: Callable[[float], None] = lambda share: None,
 ) -> RunResult:
     """Estimate poses and objects of a recording, and report.
 
-    Edges of boxes on the border of the image only bound the object from one side.
+    Edges of boxes on the border of the image only bound the object from one side. Objects that do
+    not fit a world at rest are left out; without any, the odometry is returned as it is.
 
     Parameters
     ----------
-    mode
-        Whether the odometry is improved (SLAM) or taken as the truth (MAPPING).
+    trust_ids
+        The probability that an object id of the recording stays with its object; 1 takes them for
+        final. Boxes without an id need less than 1.
     reference
         The trajectory to compare with, before and after; it may be in another world frame.
-    box_noise, size_prior, options
-        What to assume; by default ``BoxNoise``, ``scene_size_prior``, ``default_options``.
+    mode
+        Whether the odometry is improved (SLAM) or taken as the truth (MAPPING).
+    box_noise, size_prior
+        What to assume; by default ``BoxNoise``, and the size that the objects found have.
+    estimates_noise
+        Whether the level of the odometry's noise is estimated instead of believed.
+    hold_out, seed
+        Share of the boxes, chosen at random, that the map is tested on instead.
+    progress
+        Is told the share of the work that is done.
     """
+    if reference is not None:  # before the work: may they be compared?
+        common_poses(recording.timestamps, reference)
     noise = box_noise or BoxNoise()
     recording = with_cut_edges(recording)
-    prior = size_prior or scene_size_prior(recording)
-    graph = build_graph(recording, box_noise=noise, size_prior=prior)
-    if options is None:
-        estimate, summary, costs = _solve_both_ways(graph, mode)
-    else:
-        estimate, summary = solve(graph, options)
-        costs = {options.schedule.name.lower(): summary.final_cost}
-    chi2 = box_chi2(estimate, recording.detections, noise)
+    detections = recording.detections
+    held_out = choose_held_out(len(detections), hold_out, seed=seed)
+    if isinstance(size_prior, SizePriors):
+        size_prior.check_classes(set(detections.class_names.values()))
+    known = replace(recording, detections=detections.select(~held_out))
+    found = associate(
+        known,
+        trust=trust_ids,
+        mode=mode,
+        box_noise=noise,
+        size_prior=size_prior,
+        estimates_noise=estimates_noise,
+        progress=progress,
+    )
+    object_id = np.full(len(detections), -1)
+    object_id[~held_out] = found.object_id
+    shown = replace(detections, object_id=object_id)
+    estimate, marginals, summary = _finish(known, found, mode)
+    assigned = shown.select(object_id >= 0)
+    chi2 = box_chi2(estimate, assigned, noise)
+    estimate = replace(estimate, inliers=chi2 <= CHI2_GATE[4])
+    tested = detections.select(held_out if hold_out else ~held_out)
+    if trust_ids < 1.0:
+        tested = replace(tested, object_id=np.full(len(tested), -1))
     report = {
         "mode": mode.name.lower(),
         "poses": len(estimate.timestamps),
-        "boxes": describe_boxes(chi2),
-        "objects": describe_objects(estimate, recording.detections, chi2),
+        "keyframes": len(found.keyframes),
+        "boxes": describe_boxes(chi2) | {"unassigned": int(np.sum(object_id[~held_out] < 0))},
+        "objects": describe_objects(estimate, assigned, chi2),
+        "reprojection": describe_overlap(overlap_with_map(estimate, tested))
+        | {"held_out": hold_out > 0.0},
         "box_noise": {"pixels": noise.pixels, "relative": noise.relative},
+        "odometry_noise": _describe_noise(found, estimates_noise),
         "dropped_objects": {str(name): why for name, why in estimate.dropped.items()},
-        "size_prior": describe_size_prior(prior),
+        "under_constrained": [] if marginals is None else list(marginals.under_constrained),
+        "size_prior": describe_size_prior(found.scene.size_prior),
         "trajectory_error": None if reference is None else trajectory_error(estimate, reference),
-        "solver": describe_solver(summary) | {"final_costs": costs},
+        "solver": None if summary is None else describe_solver(summary),
     }
-    return RunResult(estimate, summary, report)
+    return RunResult(estimate, shown, held_out, marginals, summary, report)
 
 
-def _solve_both_ways(
-    graph: Graph, mode: _core.Mode
-) -> tuple[Estimate, _core.Summary, dict[str, float]]:
-    """Solve all at once and by growing, and keep the estimate of lower cost.
+def _finish(
+    recording: Recording, found: Association, mode: _core.Mode
+) -> tuple[Estimate, Marginals | None, _core.Summary | None]:
+    """Polish what the association ends with, and fill in the poses between the keyframes."""
+    odometry = recording.odometry
+    path = _core.dead_reckon(odometry.pose_model, odometry.first_pose, odometry.relative)
+    graph = found.scene.graph()
+    if graph is None:
+        return _nothing(recording, path, found), None, None
+    options = _core.SolveOptions(
+        mode=mode, schedule=_core.Schedule.BATCH, loss=_core.Loss.CAUCHY, loss_scale=2.0
+    )
+    solved, summary = solve(graph, options, start=found.scene.state(graph))
+    marginals = marginal_covariances(graph, solved, options)
+    ids = found.ids[solved.object_ids]
+    order = np.argsort(ids)
+    boxes = np.bincount(found.object_id[found.object_id >= 0], minlength=int(ids.max()) + 1)
+    dropped = {int(found.ids[row]): why for row, why in solved.dropped.items()} | found.left_out
+    estimate = replace(
+        solved,
+        timestamps=recording.timestamps,
+        poses=fill_in(recording, found.keyframes, solved.poses),
+        initial_poses=path,
+        object_ids=ids[order],
+        class_names=tuple(solved.class_names[row] for row in order),
+        observations=boxes[ids[order]],
+        dual_quadrics=solved.dual_quadrics[order],
+        ellipsoids=solved.ellipsoids[order],
+        dropped=dict(sorted(dropped.items())),
+    )
+    return estimate, replace(marginals, objects=marginals.objects[order]), summary
 
-    Growing survives long drift; all at once survives video, where the first few views of an
-    object have too little parallax to tell in front of from behind.
-    """
-    schedules = [_core.Schedule.BATCH]
-    if mode == _core.Mode.SLAM:
-        schedules.append(_core.Schedule.GROW)
-    poses = len(graph.timestamps)
-    results = [solve(graph, default_options(mode, schedule, poses)) for schedule in schedules]
-    costs = {
-        schedule.name.lower(): summary.final_cost
-        for schedule, (_, summary) in zip(schedules, results, strict=True)
+
+def _nothing(recording: Recording, path: NDArray[np.float64], found: Association) -> Estimate:
+    """Return the odometry as it is, and a map without objects."""
+    return Estimate(
+        pose_model=recording.odometry.pose_model,
+        camera=recording.camera,
+        timestamps=recording.timestamps,
+        poses=path,
+        initial_poses=path,
+        object_ids=np.zeros(0, dtype=np.int64),
+        class_names=(),
+        observations=np.zeros(0, dtype=np.int64),
+        dual_quadrics=np.zeros((0, 9)),
+        ellipsoids=np.zeros((0, 9)),
+        dropped=found.left_out,
+    )
+
+
+def _describe_noise(found: Association, is_estimated: bool) -> dict[str, Any]:
+    if not is_estimated or found.scene.mode == _core.Mode.MAPPING:
+        return {"from": "given"}
+    noise = found.scene.odometry_noise
+    return {
+        "from": "estimated",
+        "translation_m": noise.translation_m,
+        "rotation_rad": noise.rotation_rad,
     }
-    estimate, summary = min(results, key=lambda result: result[1].final_cost)
-    return estimate, summary, costs

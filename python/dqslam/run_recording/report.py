@@ -7,16 +7,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dqslam import _core
+from dqslam import _core, associate
 from dqslam.estimate import Estimate
 from dqslam.evaluate import absolute_trajectory_error
-from dqslam.io import Trajectory, nearest_pose
+from dqslam.evaluate_results import common_poses
+from dqslam.io import Trajectory
 from dqslam.problem import BoxNoise
 from dqslam.recording import Detections
 from dqslam.size_prior import SizePrior, SizePriors
-
-# 99 % of the boxes of an object that is where the map says lie below this: chi-square, 4 dof.
-CHI2_GATE = 13.28
 
 
 def box_chi2(estimate: Estimate, detections: Detections, noise: BoxNoise) -> NDArray[np.float64]:
@@ -31,18 +29,15 @@ def box_chi2(estimate: Estimate, detections: Detections, noise: BoxNoise) -> NDA
         max=len(estimate.object_ids) - 1
     )
     mapped = estimate.is_ellipsoid[row] & (estimate.object_ids[row] == detections.object_id)
-    predicted, in_front = _core.project_to_boxes(
-        estimate.pose_model,
+    chi2 = associate.box_chi2(
         estimate.camera,
+        estimate.pose_model,
         estimate.poses[detections.pose],
         np.where(estimate.is_ellipsoid[:, None], estimate.ellipsoids, 1.0)[row],
+        detections,
+        noise.covariance(detections.box),
     )
-    error = predicted - detections.box
-    beyond = np.where(error * [-1.0, -1.0, 1.0, 1.0] > 0.0, 0.0, error)
-    error = np.where(detections.truncated, beyond, error)
-    sigma = np.sqrt(np.diagonal(noise.covariance(detections.box), axis1=1, axis2=2))
-    chi2 = np.sum((error / sigma) ** 2, axis=1)
-    return np.where(in_front & mapped, chi2, np.inf)
+    return np.where(mapped, chi2, np.inf)
 
 
 def trajectory_error(estimate: Estimate, reference: Trajectory) -> dict[str, Any]:
@@ -52,15 +47,8 @@ def trajectory_error(estimate: Estimate, reference: Trajectory) -> dict[str, Any
     pose made equal, the paper's RMSE_pos.
     """
     model, camera = estimate.pose_model, estimate.camera
-    interval = min(_interval(estimate.timestamps), _interval(reference.timestamps))
-    row, late = nearest_pose(reference.timestamps, estimate.timestamps)
-    common = np.flatnonzero(late <= 0.5 * interval)
-    if len(common) < 3:
-        raise ValueError(
-            f"groundtruth: {len(common)} poses within {0.5 * interval:g} s of the odometry's; "
-            "3 are needed"
-        )
-    true = reference.world_from_camera[row[common]]
+    common, row = common_poses(estimate.timestamps, reference)
+    true = reference.world_from_camera[row]
 
     def error(poses: NDArray[np.float64]) -> dict[str, float]:
         cameras = _core.world_from_camera(model, camera, poses)[common]
@@ -83,16 +71,12 @@ def _start_at(first: NDArray[np.float64], poses: NDArray[np.float64]) -> NDArray
     return _core.compose(se3, np.repeat(first[None], len(poses), axis=0), first_from_path)
 
 
-def _interval(times: NDArray[np.float64]) -> float:
-    return float(np.median(np.diff(times)))
-
-
 def describe_boxes(chi2: NDArray[np.float64]) -> dict[str, Any]:
     """Count the boxes and those that do not fit, from their chi-squares (m,)."""
     return {
         "count": len(chi2),
-        "chi2_median": float(np.median(chi2)),
-        "outlier_share": float(np.mean(chi2 > CHI2_GATE)),
+        "chi2_median": float(np.median(chi2)) if len(chi2) else None,
+        "outlier_share": float(np.mean(chi2 > associate.CHI2_GATE[4])) if len(chi2) else None,
         "not_in_front": int(np.sum(np.isinf(chi2))),
     }
 
