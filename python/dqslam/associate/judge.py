@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dqslam.associate.scene_map import SceneMap
+from dqslam.traffic import usual_size
 
 # 99 % of chi-square with 3 degrees of freedom.
 SAME_PLACE = 11.34
@@ -18,12 +19,16 @@ ENOUGH = 5
 # Logarithms of sizes within a class spread by at least this, and seldom by three times as much.
 LEAST_SPREAD = 0.15
 UNUSUAL = 3.0
+# Of the logarithm of a size that is known beforehand: less than half, or twice, is another thing.
+NOT_HALF = 0.5
 
 # An object moved when without it the path explains its boxes worse than this, and with it pays
 # this much: chi-squares a box.
 BENT = 13.28
 PAID = 2.0
 LEAST_BOXES = 8
+# Share of the boxes of an id that one place explains, at least.
+LEAST_FIT = 0.5
 LEAVE_ONE_OUT_ITERATIONS = 8
 
 
@@ -92,7 +97,9 @@ def find_misfits(scene: SceneMap) -> dict[int, str]:
     """Return objects whose size is unusual for their class, and how.
 
     What moves along a straight line while the camera does looks like a thing at rest, at another
-    distance, hence of another size: of cars that come towards us, about half.
+    distance, hence of another size: of cars that come towards us, about half. The usual size is
+    learned from the objects of a class, of traffic from those that are not half as large as they
+    should be: there, most may move.
     """
     alive = np.flatnonzero(scene.box_counts > 0)
     log_size = scene.log_sizes()
@@ -100,17 +107,36 @@ def find_misfits(scene: SceneMap) -> dict[int, str]:
     misfits = {}
     for one in np.unique(called[alive]):
         members = alive[called[alive] == one]
-        if len(members) < ENOUGH:
+        name = scene.recording.detections.class_names[int(scene.classes[one])]
+        likely = log_size[members]
+        known = usual_size(name)
+        if known is not None:
+            likely = likely[np.abs(likely - known) < NOT_HALF]
+        if len(likely) < ENOUGH:
             continue
-        usual, spread = _usual(log_size[members])
+        usual, spread = _usual(likely)
         for number in members.tolist():
             ratio = log_size[number] - usual
             if abs(ratio) > UNUSUAL * max(spread, LEAST_SPREAD):
                 misfits[number] = (
-                    f"its size is {np.exp(ratio):.2g} times the usual one of its class: "
+                    f"its size is {np.exp(ratio):.2g} times the usual one of a {name}: "
                     "it moved while it was seen, or is something else"
                 )
     return misfits
+
+
+def find_scattered(scene: SceneMap) -> dict[int, str]:
+    """Return objects that do not explain most boxes of their own tracklets."""
+    owner = np.array([scene.object_of_tracklet.get(int(t), -1) for t in scene.tracklet])
+    seen = scene.recording.detections.pose < len(scene.poses)
+    scattered = {}
+    for number in np.flatnonzero(scene.box_counts > 0).tolist():
+        share = scene.box_counts[number] / np.sum(seen & (owner == number))
+        if share < LEAST_FIT:
+            scattered[number] = (
+                f"one place explains {share:.0%} of its boxes: it moved, or its id names several"
+            )
+    return scattered
 
 
 def find_movers(scene: SceneMap) -> dict[int, str]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from dqslam.associate.births import FEWEST_VIEWS
 from dqslam.associate.follow import Follower, choose, predict
-from dqslam.associate.judge import find_misfits, find_movers, join_duplicates
+from dqslam.associate.judge import find_misfits, find_movers, find_scattered, join_duplicates
 from dqslam.associate.scene_map import SceneMap
 
 ROUNDS = 3
@@ -33,6 +33,8 @@ def refine(follower: Follower, progress: Callable[[float], None]) -> None:
             join_duplicates(scene)
         scene.left_out = find_misfits(scene)
         scene.left_out |= find_movers(scene)
+        if follower.final:
+            scene.left_out |= find_scattered(scene)
         progress((done + 1) / ROUNDS)
     settle(scene)
 
