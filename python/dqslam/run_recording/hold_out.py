@@ -32,16 +32,19 @@ def choose_held_out(count: int, share: float, *, seed: int) -> NDArray[np.bool_]
     return chosen
 
 
-def overlap_with_map(estimate: Estimate, boxes: Detections) -> NDArray[np.float64]:
-    """Return the IoU of boxes with the re-projected object of their class that they show, (m,).
+def overlap_with_map(
+    estimate: Estimate, boxes: Detections
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Return the IoU of boxes with the object of their class that they show, (m,), and its id.
 
     Boxes with an id are compared with their object. Of the others in an image, pairs are chosen so
-    that the overlaps add up to the most. 0 where no object is left, NaN where none of the map has
-    the class.
+    that the overlaps with the re-projected objects add up to the most. 0 and -1 where no object is
+    left, NaN where none of the map has the class.
     """
     from scipy.optimize import linear_sum_assignment
 
     overlap = np.zeros(len(boxes))
+    shown = np.full(len(boxes), -1, dtype=np.int64)
     names = np.array([boxes.class_names[int(number)] for number in boxes.class_id], dtype=object)
     mapped = np.array(estimate.class_names, dtype=object)
     real = np.flatnonzero(estimate.is_ellipsoid)
@@ -62,8 +65,9 @@ def overlap_with_map(estimate: Estimate, boxes: Detections) -> NDArray[np.float6
         table = np.where(same & (table >= LEAST_OVERLAP), table, 0.0)
         row, column = linear_sum_assignment(table, maximize=True)
         overlap[rows[row]] = table[row, column]
+        shown[rows[row]] = np.where(table[row, column] > 0, estimate.object_ids[real[column]], -1)
     overlap[~np.isin(names, mapped)] = np.nan
-    return overlap
+    return overlap, shown
 
 
 def describe_overlap(overlap: NDArray[np.float64]) -> dict[str, Any]:

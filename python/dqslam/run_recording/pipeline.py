@@ -36,7 +36,7 @@ class RunResult:
 
     estimate: Estimate
     detections: Detections
-    """All boxes, with the ids of the objects that they show; -1 for none, or held out."""
+    """All boxes, with the ids of the objects that they show; -1 for none."""
     held_out: NDArray[np.bool_]
     """Which boxes were kept from the estimator, shape (m,)."""
     marginals: Marginals | None
@@ -130,14 +130,17 @@ def run(
     tested = detections.select(held_out if hold_out else ~held_out)
     if trust_ids < 1.0:
         tested = replace(tested, object_id=np.full(len(tested), -1))
+    overlap, tested_id = overlap_with_map(estimate, tested)
+    if hold_out:
+        object_id[held_out] = tested_id
+        shown = replace(detections, object_id=object_id)
     report = {
         "mode": mode.name.lower(),
         "poses": len(estimate.timestamps),
         "keyframes": len(found.keyframes),
         "boxes": describe_boxes(chi2) | {"unassigned": int(np.sum(object_id[~held_out] < 0))},
         "objects": describe_objects(estimate, assigned, chi2),
-        "reprojection": describe_overlap(overlap_with_map(estimate, tested))
-        | {"held_out": hold_out > 0.0},
+        "reprojection": describe_overlap(overlap) | {"held_out": hold_out > 0.0},
         "box_noise": {"pixels": noise.pixels, "relative": noise.relative},
         "odometry_noise": _describe_noise(found, estimates_noise),
         "dropped_objects": {str(name): why for name, why in estimate.dropped.items()},
@@ -179,7 +182,19 @@ def _finish(
         ellipsoids=solved.ellipsoids[order],
         dropped=dict(sorted(dropped.items())),
     )
-    return estimate, replace(marginals, objects=marginals.objects[order]), summary
+    marginals = replace(
+        marginals,
+        objects=marginals.objects[order],
+        under_constrained=tuple(_named(text, found) for text in marginals.under_constrained),
+    )
+    return estimate, marginals, summary
+
+
+def _named(sentence: str, found: Association) -> str:
+    """Name a pose by its row in the recording and an object by its id, not as in the solve."""
+    kind, row, what = sentence.split(" ", 2)  # "object 3: parameter 0 is ..."
+    names = found.keyframes if kind == "pose" else found.ids
+    return f"{kind} {names[int(row.rstrip(':'))]}: {what}"
 
 
 def _nothing(recording: Recording, path: NDArray[np.float64], found: Association) -> Estimate:
