@@ -72,3 +72,9 @@ def test_pairs_are_those_of_brute_force():
 def test_tables_of_different_length_are_refused():
     with pytest.raises(ValueError, match=r"true_id: expected shape \(3\), got \(2,\)"):
         score_association([0, 1, 2], [0, 1, 2], [0, 1])
+
+
+def test_ids_may_be_any_number():
+    pose = np.arange(4)
+    score = score_association(pose, np.array([10**15, 10**15, 3, 3]), np.array([1, 1, 2, 10**14]))
+    assert (score.precision, score.recall, score.purity) == (0.5, 1.0, 0.75)

@@ -8,6 +8,7 @@ from dqslam import _core
 from dqslam.evaluate import absolute_trajectory_error, center_errors
 from dqslam.io import FileError, OdometryNoise, Trajectory, load_recording, nearest_pose
 from dqslam.problem import BoxNoise, build_graph, solve
+from dqslam.recording import RelativePositions
 from dqslam.run_recording import (
     box_chi2,
     cut_edges,
@@ -392,3 +393,68 @@ def test_reference_of_another_time(files, orbit):
     recording, _ = load_recording(*files)
     with pytest.raises(ValueError, match="groundtruth: 0 poses within 0.05 s of the estimate's"):
         run(recording, reference=Trajectory(orbit.times + 1000, orbit.poses))
+
+
+# --- what does not come into the map
+
+
+def with_boxes(recording, rows=slice(None), **changes):
+    detections = replace(recording.detections, **changes).select(rows)
+    return replace(recording, detections=detections)
+
+
+def assert_is_odometry(result, recording):
+    odometry = recording.odometry
+    path = _core.dead_reckon(odometry.pose_model, odometry.first_pose, odometry.relative)
+    np.testing.assert_array_equal(result.estimate.poses, path)
+    assert result.estimate.object_ids.shape == (0,)
+    assert (result.marginals, result.summary, result.report["solver"]) == (None, None, None)
+    assert result.report["objects"] == []
+
+
+@pytest.mark.parametrize("trust", [1.0, 0.9])
+def test_without_a_place_for_any_object_the_odometry_is_returned(files, trust):
+    recording, _ = load_recording(*files)
+    corner = np.random.default_rng(1).uniform([0, 0], [500, 400], (160, 2))
+    anywhere = with_boxes(recording, box=np.hstack([corner, corner + 60.0]))
+    result = run(perturb_odometry(anywhere, NOISE, seed=0), trust_ids=trust, estimates_noise=True)
+    assert_is_odometry(result, perturb_odometry(anywhere, NOISE, seed=0))
+    assert result.report["reprojection"]["iou_median"] is None
+    why = "no place explains its boxes, or they leave its distance open"
+    names = ["101", "102", "105", "109"] if trust == 1.0 else []
+    assert result.report["dropped_objects"] == dict.fromkeys(names, why)
+
+
+def test_no_boxes_leave_the_odometry(files):
+    recording, _ = load_recording(*files)
+    for rows in (slice(0), recording.detections.pose == 0, recording.detections.pose == 39):
+        part = with_boxes(recording, rows)
+        assert_is_odometry(run(part, trust_ids=0.9, estimates_noise=True), part)
+    held_out = run(with_boxes(recording, slice(20)), hold_out=0.99)
+    assert held_out.held_out.all()
+    assert_is_odometry(held_out, recording)
+
+
+def test_an_object_of_too_few_boxes_is_named(files):
+    recording, _ = load_recording(*files)
+    lamp = np.flatnonzero(recording.detections.object_id == 105)
+    kept = np.ones(160, dtype=bool)
+    kept[lamp[3:]] = False
+    report = run(with_boxes(recording, kept)).report
+    assert [entry["id"] for entry in report["objects"]] == [101, 102, 109]
+    assert report["dropped_objects"] == {"105": "seen from 3 viewpoints, 4 are needed"}
+
+
+def test_ids_may_be_any_number(files):
+    recording, _ = load_recording(*files)
+    large = with_boxes(recording, object_id=recording.detections.object_id + 10**15)
+    estimate = run(large).estimate
+    np.testing.assert_array_equal(estimate.object_ids - 10**15, [101, 102, 105, 109])
+    np.testing.assert_array_equal(estimate.observations, [40] * 4)
+
+
+def test_relative_positions_take_no_part(files):
+    recording, _ = load_recording(*files)
+    wrong = RelativePositions([5], [101], [[0.0, 0.0, 50.0]], [1e-6 * np.eye(3)])
+    with_them = run(replace(recording, positions=wrong)).estimate
+    np.testing.assert_array_equal(with_them.poses, run(recording).estimate.poses)

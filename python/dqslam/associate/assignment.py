@@ -43,12 +43,11 @@ def assign(
     total = table[rows, chosen].sum()
     column = np.where(chosen < objects, chosen, -1)
     for row in range(boxes):
-        if np.isfinite(cost[row]).sum() + np.isfinite(cost[:, column[row]]).sum() < 3 and (
-            column[row] >= 0
-        ):
-            margin[row] = null[row] - cost[row, column[row]]
+        rivals = np.isfinite(cost[row]).sum()
+        if column[row] < 0 and not rivals:
             continue
-        if column[row] < 0 and not np.isfinite(cost[row]).any():
+        if column[row] >= 0 and rivals + np.isfinite(cost[:, column[row]]).sum() == 2:
+            margin[row] = null[row] - cost[row, column[row]]  # nobody else is concerned
             continue
         other = table.copy()
         other[row, chosen[row]] = _FORBIDDEN

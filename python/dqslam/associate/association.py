@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dqslam import _core
 from dqslam._checks import reject_rows
+from dqslam.associate.births import FEWEST_VIEWS
 from dqslam.associate.follow import Follower
 from dqslam.associate.keyframes import choose_keyframes
 from dqslam.associate.noise import StepNoise
@@ -55,7 +56,7 @@ def associate(
     Boxes are linked in the image to tracklets, and of a video the images from new viewpoints are
     chosen. Along the path, the tracklets are given to the objects that they clearly show, by the
     joint covariance of pose and object; objects start from tracklets, or from boxes that meet in
-    space. With the whole path known, all boxes are assigned again.
+    space. With the whole path known, all boxes are assigned again. Relative positions take no part.
 
     Parameters
     ----------
@@ -82,6 +83,7 @@ def associate(
     claims = recording.detections.object_id
     if trust == FINAL:
         reject_rows("detections.object_id", claims < 0, "final ids are needed: the box has none")
+    recording = replace(recording, positions=None)
     tracklet = link_tracklets(recording, claims=claims)
     keyframes = choose_keyframes(recording, tracklet)
     used = np.isin(recording.detections.pose, keyframes)
@@ -104,13 +106,10 @@ def associate(
         reassign(everything, follower.bonus)
         object_id, ids = _numbered(everything.box_object, len(scene.ellipsoids))
     progress(1.0)
-    return Association(
-        object_id=object_id,
-        keyframes=keyframes,
-        scene=scene,
-        ids=ids,
-        left_out={int(ids[row]): reason for row, reason in scene.left_out.items()},
-    )
+    left_out = {int(ids[row]): why for row, why in scene.left_out.items() if ids[row] >= 0}
+    if trust == FINAL:
+        left_out |= _not_found(recording, ids, used)
+    return Association(object_id, keyframes, scene, ids, dict(sorted(left_out.items())))
 
 
 def _ids_of(scene: SceneMap, claims: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -119,6 +118,22 @@ def _ids_of(scene: SceneMap, claims: NDArray[np.int64]) -> NDArray[np.int64]:
     claimed = scene.box_object >= 0
     ids[scene.box_object[claimed]] = claims[claimed]
     return ids
+
+
+def _not_found(
+    recording: Recording, ids: NDArray[np.int64], used: NDArray[np.bool_]
+) -> dict[int, str]:
+    """Say of final ids that are not in the map (ids, (o,)) why; ``used`` are keyframes' boxes."""
+    claims, pose = recording.detections.object_id, recording.detections.pose
+    reasons = {}
+    for name in np.setdiff1d(claims, ids).tolist():
+        views = len(np.unique(pose[used & (claims == name)]))
+        reasons[name] = (
+            f"seen from {views} viewpoints, {FEWEST_VIEWS} are needed"
+            if views < FEWEST_VIEWS
+            else "no place explains its boxes, or they leave its distance open"
+        )
+    return reasons
 
 
 def _with_all_images(
@@ -131,7 +146,7 @@ def _with_all_images(
     """Return the map with the poses and boxes between the keyframes."""
     everything = SceneMap(
         recording,
-        _cut_alike(tracklet, np.flatnonzero(used), scene.tracklet),
+        _cut_alike(tracklet, recording.detections.pose, used, scene.tracklet),
         box_noise=scene.box_noise,
         size_prior=scene.size_prior,
     )
@@ -143,14 +158,19 @@ def _with_all_images(
 
 
 def _cut_alike(
-    tracklet: NDArray[np.int64], used: NDArray[np.int64], cut: NDArray[np.int64]
+    tracklet: NDArray[np.int64],
+    pose: NDArray[np.int64],
+    used: NDArray[np.bool_],
+    cut: NDArray[np.int64],
 ) -> NDArray[np.int64]:
-    """Cut tracklets (m,) where those of the used boxes (u,) were cut; boxes in order of time."""
+    """Cut tracklets (m,) at the poses where those of the used boxes (u,) were cut."""
     result = tracklet.copy()
+    known_pose = pose[used]
     for number in np.unique(tracklet[used][cut != tracklet[used]]).tolist():
         rows = np.flatnonzero(tracklet == number)
         known = np.flatnonzero(tracklet[used] == number)
-        last = np.searchsorted(used[known], rows, side="right") - 1
+        known = known[np.argsort(known_pose[known], kind="stable")]
+        last = np.searchsorted(known_pose[known], pose[rows], side="right") - 1
         result[rows] = cut[known[last.clip(min=0)]]
     return result
 

@@ -39,6 +39,8 @@ def propose_groups(
         The boxes that wait.
     tracklet
         Of each box of the recording, shape (m,).
+    tracklets_only
+        Whether boxes of different tracklets never show the same object.
     """
     waiting = recording.detections.select(rows)
     rays = cast_rays(replace(recording, detections=waiting), cameras)
@@ -50,7 +52,8 @@ def propose_groups(
             rest[part] = True
         elif parallax(rays, part) >= LEAST_PARALLAX:
             groups.append(part)
-    for class_id in [] if tracklets_only else np.unique(waiting.class_id[rest]).tolist():
+    rest &= not tracklets_only
+    for class_id in np.unique(waiting.class_id[rest]).tolist():
         part = np.flatnonzero(rest & (waiting.class_id == class_id))
         part = part[np.argsort(waiting.pose[part], kind="stable")][-LONGEST_WAIT:]
         groups += _meeting(rays, waiting.pose, part)

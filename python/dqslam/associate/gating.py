@@ -77,7 +77,8 @@ def predict_boxes(
     )
     joint = covariance[own[:, :, None], own[:, None, :]]
     spread = jacobian @ joint @ jacobian.transpose(0, 2, 1)
-    return PredictedBoxes(row, box[row], spread)
+    known = np.isfinite(spread).all(axis=(1, 2))  # not of what nearly touches the camera
+    return PredictedBoxes(row[known], box[row[known]], spread[known])
 
 
 def _jacobian(

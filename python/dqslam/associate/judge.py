@@ -24,8 +24,8 @@ NOT_HALF = 0.5
 
 # An object moved when without it the path explains its boxes worse than this, and with it pays
 # this much: chi-squares a box.
-BENT = 13.28
-PAID = 2.0
+BENT = 8.0
+PAID = 1.7
 LEAST_BOXES = 8
 # Share of the boxes of an id that one place explains, at least.
 LEAST_FIT = 0.5
@@ -48,6 +48,8 @@ def join_duplicates(scene: SceneMap) -> None:
             continue
         if scene.box_counts[kept] == 0 or scene.box_counts[given_up] == 0:
             continue
+        if _are_seen_together(scene, kept, given_up):  # since one of them was joined with a third
+            continue
         a, b = (k + 9 * np.searchsorted(involved, [kept, given_up])).tolist()
         spread = _of_difference(covariance, a, b)
         spread = spread + (SIDES * min(size[kept], size[given_up])) ** 2 * np.eye(3)
@@ -65,13 +67,16 @@ def _close_pairs(scene: SceneMap, alive: NDArray[np.int64]) -> list[tuple[int, i
     called = scene.votes[alive].argmax(axis=1)
     distance = np.linalg.norm(center[:, None] - center, axis=2)
     near = (distance < 4 * (size[:, None] + size)) & (called[:, None] == called)
-    poses = [scene.recording.detections.pose[scene.box_object == number] for number in alive]
-    pairs = []
-    for i, j in np.argwhere(np.triu(near, 1)).tolist():
-        together = len(np.intersect1d(poses[i], poses[j]))
-        if together <= SEEN_TOGETHER * min(len(poses[i]), len(poses[j])):
-            pairs.append((int(alive[i]), int(alive[j])))
-    return pairs
+    pairs = [(int(alive[i]), int(alive[j])) for i, j in np.argwhere(np.triu(near, 1))]
+    return [pair for pair in pairs if not _are_seen_together(scene, *pair)]
+
+
+def _are_seen_together(scene: SceneMap, a: int, b: int) -> bool:
+    """Tell whether images show both of two objects, more of them than by mistake."""
+    pose = scene.recording.detections.pose
+    first, second = (pose[scene.box_object == number] for number in (a, b))
+    together = len(np.intersect1d(first, second))
+    return together > SEEN_TOGETHER * min(len(first), len(second))
 
 
 def _of_difference(covariance: NDArray[np.float64], a: int, b: int) -> NDArray[np.float64]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from dqslam.associate.images import group_by_pose
 from dqslam.associate.rays import cameras_by_odometry, cast_rays
 from dqslam.recording import Recording
 
@@ -32,11 +33,9 @@ def choose_keyframes(recording: Recording, tracklet: NDArray[np.int64]) -> NDArr
     """
     detections = recording.detections
     rays = cast_rays(recording, cameras_by_odometry(recording))
-    order = np.argsort(detections.pose, kind="stable")
-    poses, starts = np.unique(detections.pose[order], return_index=True)
     keyframes = [0]
     seen: dict[int, int] = {}
-    for pose, rows in zip(poses.tolist(), np.split(order, starts[1:]), strict=True):
+    for pose, rows in group_by_pose(detections.pose):
         pairs = [(seen[t], row) for row in rows if (t := int(tracklet[row])) in seen]
         if pairs and len(pairs) >= KNOWN * len(rows):
             before, now = np.array(pairs).T

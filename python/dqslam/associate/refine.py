@@ -8,6 +8,7 @@ import numpy as np
 
 from dqslam.associate.births import FEWEST_VIEWS
 from dqslam.associate.follow import Follower, choose, predict
+from dqslam.associate.images import group_by_pose
 from dqslam.associate.judge import find_misfits, find_movers, find_scattered, join_duplicates
 from dqslam.associate.scene_map import SceneMap
 
@@ -55,9 +56,7 @@ def reassign(scene: SceneMap, bonus: float) -> None:
     # What was uncertain has been fitted to these very boxes.
     certain = np.zeros((k + 9 * len(alive),) * 2)
     found = np.full(len(detections), -1)
-    order = np.argsort(detections.pose, kind="stable")
-    poses, starts = np.unique(detections.pose[order], return_index=True)
-    for pose, rows in zip(poses.tolist(), np.split(order, starts[1:]), strict=True):
+    for pose, rows in group_by_pose(detections.pose):
         predicted = predict(scene, pose, alive, certain)
         choice, margin = choose(scene, rows, alive, predicted, bonus)
         found[rows] = np.where(margin >= AMBIGUOUS, choice, -1)

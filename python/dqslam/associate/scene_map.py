@@ -171,6 +171,7 @@ class SceneMap:
         """Improve all poses and objects so far, and learn how large objects are."""
         graph = self.graph()
         if graph is None:
+            self.poses = self._path_by_odometry()
             return
         options = self._options()
         options.max_iterations = max_iterations
@@ -189,7 +190,7 @@ class SceneMap:
         graph = self.graph()
         self.left_out = left_out
         if graph is None:
-            return Outcome(0.0, self.poses)
+            return Outcome(0.0, self._path_by_odometry())
         options = self._options()
         options.max_iterations = max_iterations
         solution = _core.solve(graph.core, options, self.state(graph))
@@ -273,6 +274,12 @@ class SceneMap:
         covariance = self.step_noise.covariance(self.odometry_noise)
         odometry = replace(self.recording.odometry, covariance=covariance)
         self.recording = replace(self.recording, odometry=odometry)
+
+    def _path_by_odometry(self) -> NDArray[np.float64]:
+        """Return the poses so far as odometry alone has them, shape (n, d)."""
+        odometry = self.recording.odometry
+        steps = odometry.relative[: len(self.poses) - 1]
+        return _core.dead_reckon(odometry.pose_model, odometry.first_pose, steps)
 
     def _graph_of(
         self,

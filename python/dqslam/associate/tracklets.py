@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dqslam import _core
+from dqslam.associate.images import group_by_pose
 from dqslam.associate.rays import cameras_by_odometry, points_at_depth_one
 from dqslam.evaluate import box_iou
 from dqslam.recording import Recording
@@ -21,7 +22,7 @@ LEAST_OVERLAP = 0.3
 # its class twice as far around.
 FARTHEST_SIDES = 1.0
 LARGEST_GROWTH = 1.6
-# Images in which a tracked object may go unseen.
+# A tracked object is seen again within so many images, or taken for lost.
 LONGEST_GAP = 5
 
 
@@ -62,11 +63,9 @@ def link_tracklets(
     cameras = cameras_by_odometry(recording)
     claims = np.full(len(detections), -1) if claims is None else claims
     tracklet = np.full(len(detections), -1, dtype=np.int64)
-    order = np.argsort(detections.pose, kind="stable")
-    poses, starts = np.unique(detections.pose[order], return_index=True)
     tracks: list[_Track] = []
     started = 0
-    for pose, rows in zip(poses.tolist(), np.split(order, starts[1:]), strict=True):
+    for pose, rows in group_by_pose(detections.pose):
         tracks = [track for track in tracks if pose - track.pose <= LONGEST_GAP]
         predicted = _predict(tracks, pose, cameras, camera)
         box, class_id = detections.box[rows], detections.class_id[rows]

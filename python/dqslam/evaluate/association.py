@@ -49,7 +49,7 @@ def score_association(pose: Ints, object_id: Ints, true_id: Ints) -> Association
     taken, true = object_id >= 0, true_id >= 0
     counts = _contingency(object_id[taken & true], true_id[taken & true])
     together = _pairs(counts)
-    precision = _ratio(together, _pairs(np.bincount(object_id[taken])))
+    precision = _ratio(together, _pairs(np.unique(object_id[taken], return_counts=True)[1]))
     recall = _ratio(together, _pairs(np.unique(true_id[true], return_counts=True)[1]))
     mostly, most = _majorities(object_id[taken], true_id[taken])
     found = np.unique(mostly[mostly >= 0])

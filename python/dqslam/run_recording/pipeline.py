@@ -160,16 +160,20 @@ def _finish(
     path = _core.dead_reckon(odometry.pose_model, odometry.first_pose, odometry.relative)
     graph = found.scene.graph()
     if graph is None:
-        return _nothing(recording, path, found), None, None
+        return _nothing(recording, path, found.left_out), None, None
     options = _core.SolveOptions(
         mode=mode, schedule=_core.Schedule.BATCH, loss=_core.Loss.CAUCHY, loss_scale=2.0
     )
     solved, summary = solve(graph, options, start=found.scene.state(graph))
-    marginals = marginal_covariances(graph, solved, options)
     ids = found.ids[solved.object_ids]
     order = np.argsort(ids)
-    boxes = np.bincount(found.object_id[found.object_id >= 0], minlength=int(ids.max()) + 1)
+    order = order[ids[order] >= 0]  # those without a box, now that all images are seen, are gone
     dropped = {int(found.ids[row]): why for row, why in solved.dropped.items()} | found.left_out
+    dropped.pop(-1, None)
+    if not order.size:
+        return _nothing(recording, path, dropped), None, None
+    marginals = marginal_covariances(graph, solved, options)
+    boxes = dict(zip(*np.unique(found.object_id, return_counts=True), strict=True))
     estimate = replace(
         solved,
         timestamps=recording.timestamps,
@@ -177,7 +181,7 @@ def _finish(
         initial_poses=path,
         object_ids=ids[order],
         class_names=tuple(solved.class_names[row] for row in order),
-        observations=boxes[ids[order]],
+        observations=np.array([boxes[name] for name in ids[order]], dtype=np.int64),
         dual_quadrics=solved.dual_quadrics[order],
         ellipsoids=solved.ellipsoids[order],
         dropped=dict(sorted(dropped.items())),
@@ -197,7 +201,7 @@ def _named(sentence: str, found: Association) -> str:
     return f"{kind} {names[int(row.rstrip(':'))]}: {what}"
 
 
-def _nothing(recording: Recording, path: NDArray[np.float64], found: Association) -> Estimate:
+def _nothing(recording: Recording, path: NDArray[np.float64], dropped: dict[int, str]) -> Estimate:
     """Return the odometry as it is, and a map without objects."""
     return Estimate(
         pose_model=recording.odometry.pose_model,
@@ -210,7 +214,7 @@ def _nothing(recording: Recording, path: NDArray[np.float64], found: Association
         observations=np.zeros(0, dtype=np.int64),
         dual_quadrics=np.zeros((0, 9)),
         ellipsoids=np.zeros((0, 9)),
-        dropped=found.left_out,
+        dropped=dict(sorted(dropped.items())),
     )
 
 

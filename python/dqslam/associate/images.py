@@ -1,0 +1,14 @@
+"""The boxes of each image."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def group_by_pose(pose: NDArray[np.int64]) -> list[tuple[int, NDArray[np.int64]]]:
+    """Return poses in order of time, each with the rows of its boxes; ``pose`` is theirs, (m,)."""
+    order = np.argsort(pose, kind="stable")
+    poses, starts = np.unique(pose[order], return_index=True)
+    groups = np.split(order, starts)[1:]  # what is before the first start is empty
+    return list(zip(poses.tolist(), groups, strict=True))
