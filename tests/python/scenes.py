@@ -1,0 +1,154 @@
+"""Filmed scenes: cameras, ellipsoids at rest or moving, and a detector that errs.
+
+Boxes come from the outline of the projected dual quadric, in plain numpy: nothing is shared with
+the package's projection.
+"""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from dqslam import Camera, Detections, Odometry, PoseModel, Recording, _core
+from dqslam.io import OdometryNoise
+from orbit import looking_at_origin
+
+CAMERA = Camera(500.0, 510.0, 321.0, 239.0, 640, 480)
+NAMES = {1: "cup", 2: "car", 3: "book"}
+
+
+@dataclass
+class Thing:
+    """An ellipsoid."""
+
+    center: np.ndarray
+    """Metres, at the first pose, shape (3,)."""
+    semi_axes: np.ndarray
+    class_id: int = 1
+    path: np.ndarray | None = None
+    """Centre at each pose (n, 3), of what moves."""
+    turn: np.ndarray = field(default_factory=lambda: np.eye(3))
+
+    def at(self, pose):
+        return self.center if self.path is None else self.path[pose]
+
+
+@dataclass
+class Film:
+    """A recording without ids, and the truth."""
+
+    recording: Recording
+    poses: np.ndarray
+    """world_from_camera, shape (n, 7)."""
+    thing: np.ndarray
+    """Which thing each box shows, -1 for a false positive, shape (m,)."""
+    things: list[Thing]
+
+    def with_ids(self, ids=None):
+        """Return the recording with the true ids, or others (m,)."""
+        ids = self.thing if ids is None else ids
+        return replace(self.recording, detections=replace(self.recording.detections, object_id=ids))
+
+    def ate(self, poses):
+        """Return the root mean square distance of positions, first pose fixed, metres."""
+        return float(np.sqrt(np.mean(np.sum((poses - self.poses)[:, :3] ** 2, axis=1))))
+
+    @property
+    def odometry(self):
+        """Poses by odometry alone, shape (n, 7)."""
+        odometry = self.recording.odometry
+        return _core.dead_reckon(odometry.pose_model, odometry.first_pose, odometry.relative)
+
+    @property
+    def centers(self):
+        return np.array([thing.center for thing in self.things])
+
+
+def film(poses, things, *, noise=None, noise_px=1.0, missed=0.0, false_positives=0.0, seed=0):
+    """Show things to a detector at poses (n, 7), world_from_camera.
+
+    ``noise`` is that of a step of odometry, exact by default. A box is missed with the probability
+    ``missed``; an image has ``false_positives`` boxes of nothing, on average.
+    """
+    random = np.random.default_rng(seed)
+    rows = []
+    for pose in range(len(poses)):
+        for number, thing in enumerate(things):
+            box = outline(poses[pose], thing.at(pose), thing.semi_axes, thing.turn)
+            if box is not None and random.random() >= missed:
+                rows.append((pose, box + random.normal(0.0, noise_px, 4), thing.class_id, number))
+        for _ in range(random.poisson(false_positives)):
+            corner = random.uniform([0.0, 0.0], [540.0, 380.0])
+            box = np.concatenate([corner, corner + random.uniform(20.0, 100.0, 2)])
+            rows.append((pose, box, int(random.choice([one.class_id for one in things])), -1))
+    se3 = PoseModel.SE3
+    relative = _core.between(se3, poses[:-1], poses[1:])
+    believed = noise or OdometryNoise(1e-4, 1e-4)
+    if noise is not None:
+        sigma = np.repeat([noise.translation_m, noise.rotation_rad], 3)
+        relative = _core.plus(se3, relative, random.normal(0.0, sigma, (len(relative), 6)))
+    pose, box, class_id, thing = zip(*rows, strict=True)
+    detections = Detections(
+        pose=pose,
+        box=box,
+        score=np.ones(len(rows)),
+        class_id=class_id,
+        object_id=np.full(len(rows), -1),
+        class_names=NAMES,
+    )
+    odometry = Odometry(se3, poses[0], relative, believed.covariance(len(relative)))
+    recording = Recording(CAMERA, 0.1 * np.arange(len(poses)), odometry, detections)
+    return Film(recording, poses, np.array(thing), things)
+
+
+def outline(pose, center, semi_axes, turn):
+    """Return the box of an ellipsoid seen from a pose (7,), None unless wholly in the image.
+
+    The image of the dual quadric Q is the dual conic P Q P^T, whose tangents at u = const. are
+    (1, 0, -u): a quadratic equation.
+    """
+    rotation = Rotation.from_quat(pose[3:]).as_matrix()
+    seen = rotation.T @ (center - pose[:3])
+    shape = rotation.T @ turn * semi_axes
+    if seen[2] - np.linalg.norm(shape[2]) <= 0.1:
+        return None
+    k = np.array([[CAMERA.fx, 0, CAMERA.cx], [0, CAMERA.fy, CAMERA.cy], [0, 0, 1]])
+    conic = k @ (shape @ shape.T - np.outer(seen, seen)) @ k.T
+    edges = np.empty(4)
+    for axis in (0, 1):
+        middle = conic[axis, 2] / conic[2, 2]
+        half = np.sqrt(middle**2 - conic[axis, axis] / conic[2, 2])
+        edges[axis], edges[axis + 2] = middle - half, middle + half
+    inside = (edges[:2] > 4).all() and (edges[2:] < [CAMERA.width - 5, CAMERA.height - 5]).all()
+    return edges if inside else None
+
+
+def orbit_poses(count=40, turns=1.0, distance=1.2):
+    """Circle around the origin, looking at it; x-y is the table; (n, 7)."""
+    angle = np.linspace(0.0, 2 * np.pi * turns, count, endpoint=False)
+    around = [np.cos(angle), np.sin(angle), 0.6 + 0.15 * np.sin(3 * angle)]
+    position = distance * np.column_stack(around)
+    turns = [Rotation.from_matrix(looking_at_origin(point)).as_quat() for point in position]
+    return np.hstack([position, turns])
+
+
+def street_poses(count=60, step=1.0):
+    """Drive straight ahead along z, x to the right, y down; (n, 7)."""
+    poses = np.zeros((count, 7))
+    poses[:, 2] = step * np.arange(count)
+    poses[:, 6] = 1.0
+    return poses
+
+
+def table_things(count=8, seed=0):
+    """Put cups and books of one size on a ring and in its middle: every other one is a cup."""
+    random = np.random.default_rng(seed)
+    things = []
+    for i in range(count):
+        angle = 2 * np.pi * i / count
+        radius = 0.35 if i % 2 else 0.18
+        center = np.array([radius * np.cos(angle), radius * np.sin(angle), 0.02 * i])
+        turn = Rotation.random(random_state=random).as_matrix()
+        semi_axes = random.uniform(0.03, 0.06, 3)
+        things.append(Thing(center, semi_axes, class_id=1 if i % 2 else 3, turn=turn))
+    return things
