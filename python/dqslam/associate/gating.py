@@ -77,7 +77,10 @@ def predict_boxes(
     )
     joint = covariance[own[:, :, None], own[:, None, :]]
     spread = jacobian @ joint @ jacobian.transpose(0, 2, 1)
-    known = np.isfinite(spread).all(axis=(1, 2))  # not of what nearly touches the camera
+    # Of what nearly touches the camera, or may be anywhere in the image, nothing is predicted.
+    size = float(np.hypot(camera.width, camera.height))
+    variance = np.trace(np.nan_to_num(spread, nan=np.inf), axis1=1, axis2=2)
+    known = np.isfinite(spread).all(axis=(1, 2)) & (variance < size**2)
     return PredictedBoxes(row[known], box[row[known]], spread[known])
 
 
