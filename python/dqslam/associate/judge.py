@@ -22,6 +22,8 @@ UNUSUAL = 3.0
 # Of the logarithm of a size that is known beforehand: less than half, or twice, is another thing.
 NOT_HALF = 0.5
 
+# Of chi-square with 4 degrees of freedom.
+MEDIAN_CHI2 = 3.36
 # An object moved when without it the path explains its boxes worse than this, and with it pays
 # this much: chi-squares a box.
 BENT = 8.0
@@ -164,7 +166,7 @@ def find_movers(scene: SceneMap) -> dict[int, str]:
             fit = scene.chi2(rows, np.tile(ellipsoids, (len(rows), 1)), blur=0.0)
         if np.median(fit) > BENT:
             movers[number] = (
-                f"without it, the path explains its boxes {np.median(fit):.0f} times worse than "
-                "chance: it moved"
+                "without it, the path explains its boxes "
+                f"{np.median(fit) / MEDIAN_CHI2:.0f} times worse than chance: it moved"
             )
     return movers
