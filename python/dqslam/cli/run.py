@@ -212,7 +212,8 @@ def _overview(report: dict[str, Any]) -> "Table":
     table.add_row("poses", f"{report['poses']}, {report['keyframes']} of them keyframes")
     table.add_row(
         "boxes",
-        f"{boxes['count']} of {len(report['objects'])} objects, {boxes['unassigned']} of none",
+        f"{boxes['count']} of {len(report['objects'])} objects, {boxes['of_dropped_objects']} of "
+        f"objects not in the map, {boxes['unassigned']} of none",
     )
     table.add_row("left out", _left_out(report["dropped_boxes"], report["ids"]))
     if boxes["count"]:

@@ -127,6 +127,7 @@ def run(
     assigned = shown.select(object_id >= 0)
     chi2 = box_chi2(estimate, assigned, noise)
     estimate = replace(estimate, inliers=chi2 <= CHI2_GATE[4])
+    mapped = np.isin(assigned.object_id, estimate.object_ids)
     tested = detections.select(held_out if hold_out else ~held_out)
     if trust_ids < 1.0:
         tested = replace(tested, object_id=np.full(len(tested), -1))
@@ -138,7 +139,11 @@ def run(
         "mode": mode.name.lower(),
         "poses": len(estimate.timestamps),
         "keyframes": len(found.keyframes),
-        "boxes": describe_boxes(chi2) | {"unassigned": int(np.sum(object_id[~held_out] < 0))},
+        "boxes": describe_boxes(chi2[mapped])
+        | {
+            "of_dropped_objects": int(np.sum(~mapped)),
+            "unassigned": int(np.sum(found.object_id < 0)),
+        },
         "objects": describe_objects(estimate, assigned, chi2),
         "reprojection": describe_overlap(overlap) | {"held_out": hold_out > 0.0},
         "box_noise": {"pixels": noise.pixels, "relative": noise.relative},
