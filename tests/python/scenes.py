@@ -10,7 +10,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from dqslam import Camera, Detections, Odometry, PoseModel, Recording, _core
+from dqslam.associate.scene_map import SceneMap
 from dqslam.io import OdometryNoise
+from dqslam.problem import BoxNoise
 from orbit import looking_at_origin
 
 CAMERA = Camera(500.0, 510.0, 321.0, 239.0, 640, 480)
@@ -121,6 +123,23 @@ def outline(pose, center, semi_axes, turn):
         edges[axis], edges[axis + 2] = middle - half, middle + half
     inside = (edges[:2] > 4).all() and (edges[2:] < [CAMERA.width - 5, CAMERA.height - 5]).all()
     return edges if inside else None
+
+
+def map_truly(made, labels=None, *, step_noise=None):
+    """Return a map of a whole film: each thing with its boxes, or those of other labels (m,).
+
+    Poses are the odometry's, objects are where their things are when they are first seen.
+    """
+    labels = made.thing if labels is None else labels
+    scene = SceneMap(made.recording, labels, box_noise=BoxNoise(1.0, 0.0), step_noise=step_noise)
+    scene.extend(len(made.poses))
+    for label in np.unique(labels[labels >= 0]):
+        rows = np.flatnonzero(labels == label)
+        thing = made.things[made.thing[rows[0]]]
+        center = thing.at(made.recording.detections.pose[rows[0]])
+        turn = Rotation.from_matrix(thing.turn).as_quat()
+        scene.add_object(_core.ellipsoid_from_axes(center, thing.semi_axes, turn), rows)
+    return scene
 
 
 def orbit_poses(count=40, turns=1.0, distance=1.2):
