@@ -1,0 +1,132 @@
+"""``./run bench``: measure, show, save, and compare with a baseline."""
+
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from benchmarks import compare, report
+from benchmarks.cases import ALL_PROGRAMS, CASES, DEFAULT_CASES, LINEARISE
+from benchmarks.figure import plot_scaling, scaling_cases
+from benchmarks.linearise import PROGRAM, linearise
+from benchmarks.machine import describe
+from benchmarks.measure import ROOT, Command, dqslam_command, measure, scipy_command
+from benchmarks.peers import PeerMissingError, gtsam_command
+from benchmarks.results import Linearised, Measured, Results, load_results, save_results
+
+_HELP = f"Of {', '.join([*CASES, LINEARISE])}; by default {', '.join(DEFAULT_CASES)}."
+
+
+def bench(
+    cases: Annotated[list[str] | None, typer.Argument(help=_HELP, show_default=False)] = None,
+    baseline: Annotated[
+        Path | None, typer.Option("--compare", exists=True, dir_okay=False, help="A bench.json.")
+    ] = None,
+    repeat: Annotated[int, typer.Option(min=1, help="Runs of each program and case.")] = 5,
+    seed: Annotated[int, typer.Option(min=0, help="Of the problems.")] = 0,
+    noise: Annotated[
+        float | None, typer.Option(min=0.0, help="Factor on odometry's noise; default: the case's.")
+    ] = None,
+    programs: Annotated[
+        str, typer.Option(help="Separated by commas; dqslam, gtsam_quadrics, scipy.")
+    ] = ",".join(ALL_PROGRAMS),
+    limit: Annotated[
+        float, typer.Option(min=1.0, help="Seconds of a run; beyond, it fails.")
+    ] = 600,
+    out: Annotated[Path, typer.Option(help="Directory for bench.json and scaling.png.")] = Path(
+        "results/bench"
+    ),
+) -> None:
+    """Measure dqslam and its peers side by side; exit status 1 where a baseline was better."""
+    console = Console()
+    cases = cases or list(DEFAULT_CASES)
+    _check("case", cases, [*CASES, LINEARISE])
+    chosen = programs.split(",")
+    _check("program", chosen, ALL_PROGRAMS)
+    before = load_results(baseline) if baseline else None
+
+    skipped: dict[str, str] = {}
+    linearised = _linearised(repeat, skipped) if LINEARISE in cases else ()
+    commands = _commands(chosen, skipped)
+    measured: list[Measured] = []
+    for name in cases:
+        if name != LINEARISE:
+            case = CASES[name]
+            solving = {key: commands[key] for key in case.programs if key in commands}
+            problem = case.problem(seed, noise)
+            measured += measure(name, problem, solving, repeat=repeat, limit_s=limit, progress=_say)
+    results = Results(describe(), _version(), seed, tuple(measured), linearised, skipped)
+    out.mkdir(parents=True, exist_ok=True)
+    save_results(results, out / "bench.json")
+    for table in report.tables(results):
+        console.print(table)
+    for name, reason in skipped.items():
+        console.print(f"no {name}: {reason}", markup=False)
+    console.print(f"wrote {out / 'bench.json'}", markup=False)
+    _plot(results, out / "scaling.png", console)
+    if before is not None:
+        changes = compare.compare(results, before)
+        console.print(report.change_table(changes))
+        if results.machine != before.machine:
+            console.print("The baseline is of another machine or system.")
+        if any(change.complaints for change in changes):
+            raise typer.Exit(1)
+
+
+def _check(what: str, names: list[str], known: list[str] | tuple[str, ...]) -> None:
+    for name in names:
+        if name not in known:
+            raise typer.BadParameter(f"no {what} {name!r}; there are: {', '.join(known)}")
+
+
+def _say(what: str) -> None:
+    """Show what goes on, on stderr."""
+    sys.stderr.write(f"== {what}\n")
+
+
+def _commands(chosen: list[str], skipped: dict[str, str]) -> dict[str, Command]:
+    """Return what runs each program; a peer that is not there is skipped, and why."""
+    commands = {}
+    for program in chosen:
+        if program == "gtsam_quadrics":
+            try:
+                commands[program] = gtsam_command(_say)
+            except PeerMissingError as error:
+                skipped[program] = str(error)
+        else:
+            commands[program] = dqslam_command() if program == compare.DQSLAM else scipy_command()
+    return commands
+
+
+def _linearised(repeat: int, skipped: dict[str, str]) -> tuple[Linearised, ...]:
+    try:
+        return linearise(repeat)
+    except FileNotFoundError:
+        skipped[LINEARISE] = f"{PROGRAM.relative_to(ROOT)} was not built"
+        return ()
+
+
+def _plot(results: Results, path: Path, console: Console) -> None:
+    if not scaling_cases(results):
+        return
+    if find_spec("matplotlib") is None:
+        console.print(f"no {path.name}: matplotlib is missing")
+        return
+    plot_scaling(results, path)
+    console.print(f"wrote {path}", markup=False)
+
+
+def _version() -> str:
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version("dqslam")
+    except PackageNotFoundError:
+        return "not installed"
+
+
+if __name__ == "__main__":
+    typer.run(bench)

@@ -1,0 +1,1 @@
+"""The measured programs: each solves one problem in a process of its own."""

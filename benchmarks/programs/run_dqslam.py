@@ -1,0 +1,37 @@
+"""Solve with dqslam, from odometry alone, as `dqslam.solve` does by default."""
+
+import sys
+
+from benchmarks.exchange import Stopwatch, write_answer
+from benchmarks.files import load_problem
+from benchmarks.problems import BOX_SIGMA_PX
+from dqslam import BoxNoise, Summary, build_graph, solve
+
+
+def main(problem: str, answer: str) -> None:
+    """Read a problem, write the answer."""
+    recording, _ = load_problem(problem)
+    stopwatch = Stopwatch()
+    with stopwatch("build"):
+        graph = build_graph(recording, box_noise=BoxNoise(pixels=BOX_SIGMA_PX, relative=0.0))
+    with stopwatch("solve"):
+        estimate, summary = solve(graph)
+    write_answer(
+        answer,
+        estimate.poses,
+        estimate.dual_quadrics,
+        stopwatch,
+        iterations=summary.iterations,
+        cost=summary.final_cost,
+        **split(summary),
+    )
+
+
+def split(summary: Summary) -> dict[str, float | None]:
+    """Return where the time of the solve went, None for what the core does not tell."""
+    names = ("start_seconds", "evaluation_seconds", "linear_solver_seconds")
+    return {name: getattr(summary, name, None) for name in names}
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
