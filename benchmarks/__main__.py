@@ -28,7 +28,8 @@ def bench(
     repeat: Annotated[int, typer.Option(min=1, help="Runs of each program and case.")] = 5,
     seed: Annotated[int, typer.Option(min=0, help="Of the problems.")] = 0,
     noise: Annotated[
-        float | None, typer.Option(min=0.0, help="Factor on odometry's noise; default: the case's.")
+        float | None,
+        typer.Option(min=1e-6, help="Factor on odometry's noise; default: the case's."),
     ] = None,
     programs: Annotated[
         str, typer.Option(help="Separated by commas; dqslam, gtsam_quadrics, scipy.")
