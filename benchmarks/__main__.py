@@ -17,6 +17,7 @@ from benchmarks.measure import ROOT, Command, dqslam_command, measure, scipy_com
 from benchmarks.peers import PeerMissingError, gtsam_command
 from benchmarks.results import Linearised, Measured, Results, load_results, save_results
 
+_WIDTH = 125  # of the tables, characters: in a file they are not squeezed
 _HELP = f"Of {', '.join([*CASES, LINEARISE])}; by default {', '.join(DEFAULT_CASES)}."
 
 
@@ -42,7 +43,7 @@ def bench(
     ),
 ) -> None:
     """Measure dqslam and its peers side by side; exit status 1 where a baseline was better."""
-    console = Console()
+    console = Console(width=max(_WIDTH, Console().width))
     cases = cases or list(DEFAULT_CASES)
     _check("case", cases, [*CASES, LINEARISE])
     chosen = programs.split(",")

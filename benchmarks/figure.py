@@ -13,22 +13,28 @@ _COLOURS = {"dqslam": "#D55E00", "gtsam_quadrics": "#0072B2", "scipy": "#009E73"
 
 
 def scaling_cases(results: Results) -> dict[str, list[Measured]]:
-    """Return by program the chains of areas it solved, fewest boxes first."""
+    """Return by program the chains of areas it solved, fewest boxes first; two sizes or none."""
     found: dict[str, list[Measured]] = {}
     for one in sorted(results.measured, key=lambda one: one.size["boxes"]):
         if one.case != "paper" and not one.failure:  # that one is another kind of drive
             found.setdefault(one.program, []).append(one)
-    return found
+    return found if any(len(sizes) > 1 for sizes in found.values()) else {}
 
 
 def plot_scaling(results: Results, path: Path) -> None:
-    """Draw both on logarithmic axes, with a line of slope one; at least one case is needed."""
+    """Draw both on logarithmic axes, with a line of slope one.
+
+    Raises
+    ------
+    ValueError
+        When there are no two sizes.
+    """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     cases = scaling_cases(results)
     if not cases:
-        raise ValueError("there is no chain of areas to draw")
+        raise ValueError("there are no chains of areas of two sizes to draw")
     figure = Figure(figsize=(9.0, 4.0), layout="constrained")
     FigureCanvasAgg(figure)
     time, memory = figure.subplots(1, 2)
