@@ -48,7 +48,7 @@ def bench(
     _check("case", cases, [*CASES, LINEARISE])
     chosen = programs.split(",")
     _check("program", chosen, ALL_PROGRAMS)
-    before = load_results(baseline) if baseline else None
+    before = _baseline(baseline) if baseline else None
 
     skipped: dict[str, str] = {}
     linearised = _linearised(repeat, skipped) if LINEARISE in cases else ()
@@ -65,6 +65,8 @@ def bench(
     save_results(results, out / "bench.json")
     for table in report.tables(results):
         console.print(table)
+    for failure in report.failures(results):
+        console.print(failure, markup=False)
     for name, reason in skipped.items():
         console.print(f"no {name}: {reason}", markup=False)
     console.print(f"wrote {out / 'bench.json'}", markup=False)
@@ -82,6 +84,13 @@ def _check(what: str, names: list[str], known: list[str] | tuple[str, ...]) -> N
     for name in names:
         if name not in known:
             raise typer.BadParameter(f"no {what} {name!r}; there are: {', '.join(known)}")
+
+
+def _baseline(path: Path) -> Results:
+    try:
+        return load_results(path)
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from None
 
 
 def _say(what: str) -> None:

@@ -30,7 +30,7 @@ def speed_table(results: Results) -> "Table":
     table = _table(title, "case", "program", *columns, "peak MB")
     for one in results.measured:
         if one.failure:
-            table.add_row(one.case, one.program, one.failure)
+            table.add_row(one.case, one.program, "failed")
             continue
         reference = results.find(one.case, DQSLAM)
         ratio = f"{one.cpu_s()[0] / reference.cpu_s()[0]:.2f}" if reference else _NONE
@@ -43,6 +43,13 @@ def speed_table(results: Results) -> "Table":
             f"{one.peak_mb:.0f}",
         )
     return table
+
+
+def failures(results: Results) -> Iterator[str]:
+    """Say which programs gave no answer, and why."""
+    for one in results.measured:
+        if one.failure:
+            yield f"{one.program} failed on {one.case}: {one.failure}"
 
 
 def iteration_table(results: Results) -> "Table":

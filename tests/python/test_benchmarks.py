@@ -11,13 +11,12 @@ import numpy as np
 import pytest
 import typer
 from benchmarks import __main__ as command_line
-from benchmarks import compare, measure, report
+from benchmarks import compare, measure, peers, report
 from benchmarks.cases import CASES, Case
 from benchmarks.exchange import Stopwatch, peak_memory_mb, write_answer
 from benchmarks.figure import plot_scaling, scaling_cases
 from benchmarks.files import load_problem, save_problem
 from benchmarks.linearise import read_google_benchmark
-from benchmarks.peers import _VENV, gtsam_command
 from benchmarks.problems import BOX_SIGMA_PX, Problem, chain, paper
 from benchmarks.programs import run_dqslam, run_scipy
 from benchmarks.results import Measured, Results, Run, Score, Stage, load_results, save_results
@@ -284,11 +283,13 @@ def test_upper_triangles_by_hand(run_gtsam):
     )
 
 
-@pytest.mark.skipif(not _VENV.is_dir(), reason="./run bench makes gtsam_quadrics' environment")
+@pytest.mark.skipif(
+    not peers._VENV.is_dir(), reason="./run bench makes gtsam_quadrics' environment"
+)
 def test_gtsam_quadrics_finds_the_trajectory_too(tmp_path):
     problem = chain(1, 10, 0, 0.1)
     save_problem(problem, tmp_path / "problem.npz")
-    command = gtsam_command(lambda _: None)
+    command = peers.gtsam_command(lambda _: None)
     run = measure.run_once(
         command, problem, tmp_path / "problem.npz", tmp_path / "answer.npz", limit_s=60.0
     )
@@ -296,6 +297,15 @@ def test_gtsam_quadrics_finds_the_trajectory_too(tmp_path):
     assert run.score.rmse_m < 0.05
     fitted = (3 * 520 + 9 * 10) / (4 * 1825)  # parameters take up that share of the noise
     assert run.score.box_rms_px == pytest.approx(np.sqrt(1.0 - fitted), rel=0.05)
+
+
+def test_a_peer_without_its_python_is_missing(monkeypatch, tmp_path):
+    monkeypatch.setattr(peers, "_VENV", measure.ROOT / "build" / "bench" / "none")
+    monkeypatch.setattr(peers, "_candidates", lambda: iter([str(tmp_path / "python3.10")]))
+    said = []
+    with pytest.raises(peers.PeerMissingError, match=r"no python3\.10 .* DQSLAM_PYTHON310"):
+        peers.gtsam_command(said.append)
+    assert said == ["installing gtsam_quadrics==0.3.0 into build/bench/none"]
 
 
 # --- scores ------------------------------------------------------------------------------------
@@ -435,7 +445,8 @@ def test_speed_table_by_hand():
     ours = measured("paper", "dqslam", [2.0, 1.0, 4.0])
     table = report.speed_table(results(ours, measured("paper", "gtsam_quadrics", [6.0]), failed))
     assert cells(table, "over dqslam") == ["1.00", "3.00", ""]
-    assert cells(table, "build") == ["0.4", "1.2", "too slow"]
+    assert cells(table, "build") == ["0.4", "1.2", "failed"]
+    assert list(report.failures(results(ours, failed))) == ["scipy failed on paper: too slow"]
     assert cells(table, "start") == ["-", "-", ""]
     shown = [cells(table, heading)[0] for heading in ("total", "least", "greatest", "wall s")]
     assert shown == ["2", "1", "4", "4"]
@@ -550,6 +561,13 @@ def test_bench_writes_results_that_compare_with_themselves(app, tmp_path):
     save_results(worst, tmp_path / "then.json")
     compared = CliRunner().invoke(app, [*options, "--compare", str(tmp_path / "then.json")])
     assert compared.exit_code == 0, compared.output
+
+
+def test_a_broken_baseline_is_refused(app, tmp_path):
+    (tmp_path / "then.json").write_text("{}", encoding="utf-8")
+    refused = CliRunner().invoke(app, ["tiny", "--compare", str(tmp_path / "then.json")])
+    assert refused.exit_code == 2
+    assert "Field required" in refused.output
 
 
 @pytest.mark.parametrize(
