@@ -59,10 +59,9 @@ template <typename Pose, typename T>
 CameraInWorld<T> LocateCamera(const T* pose, const Mount& mount) {
   const Rigid<T> world_from_robot = Pose::WorldFromRobot(pose);
   CameraInWorld<T> camera;
-  camera.camera_from_world =
-      mount.camera_from_robot.cast<T>() * world_from_robot.rotation.transpose();
+  camera.camera_from_world = mount.camera_from_robot * world_from_robot.rotation.transpose();
   camera.position =
-      world_from_robot.translation + world_from_robot.rotation * mount.camera_in_robot.cast<T>();
+      world_from_robot.translation + world_from_robot.rotation * mount.camera_in_robot;
   return camera;
 }
 

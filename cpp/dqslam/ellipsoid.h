@@ -94,8 +94,9 @@ bool ProjectToBox(const Surface<T>& in_camera, const Camera& camera, Vector4<T>*
     const T discriminant = B * B - A * D;
     if (!(discriminant > T(0))) return false;
     const T root = sqrt(discriminant);
-    (*box)[axis] = T(focal[axis]) * (B + root) / D + T(principal[axis]);
-    (*box)[axis + 2] = T(focal[axis]) * (B - root) / D + T(principal[axis]);
+    const T scale = focal[axis] / D;
+    (*box)[axis] = (B + root) * scale + principal[axis];
+    (*box)[axis + 2] = (B - root) * scale + principal[axis];
   }
   return true;
 }
@@ -118,10 +119,10 @@ bool TangentDistances(const Surface<T>& in_camera,
     const int axis = edge % 2;
     const double outward = edge < 2 ? -1 : 1;
     const double x = (box[edge] - principal[axis]) / focal[axis];
-    const T squared = S(axis, axis) - T(2 * x) * S(axis, 2) + T(x * x) * S(2, 2);
+    const T squared = S(axis, axis) - 2 * x * S(axis, 2) + x * x * S(2, 2);
     if (!(squared > T(0))) return false;
     (*distances)[edge] =
-        T(focal[axis] / depth) * (T(outward) * (p[axis] - T(x) * p.z()) + sqrt(squared));
+        focal[axis] / depth * (outward * (p[axis] - x * p.z()) + sqrt(squared));
   }
   return true;
 }

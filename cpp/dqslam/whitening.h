@@ -43,8 +43,7 @@ template <int kSize, typename T>
 void Whiten(const Eigen::Matrix<double, kSize, kSize>& sqrt_information,
             const Eigen::Matrix<T, kSize, 1>& error,
             T* residual) {
-  Eigen::Map<Eigen::Matrix<T, kSize, 1>>(residual).noalias() =
-      sqrt_information.template cast<T>() * error;
+  Eigen::Map<Eigen::Matrix<T, kSize, 1>>(residual).noalias() = sqrt_information * error;
 }
 
 }  // namespace dqslam
