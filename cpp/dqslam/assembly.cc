@@ -42,7 +42,7 @@ class Assembler {
       takes_part[graph_.boxes.object[row]] = true;
     }
     AddPositions(takes_part);
-    if (Landmark::kModel == LandmarkModel::kEllipsoid) AddObjectPriors(takes_part);
+    if (Landmark::kModel == LandmarkModel::kEllipsoid) PrepareEllipsoids(takes_part);
     AddCameraHeight();
   }
 
@@ -159,9 +159,12 @@ class Assembler {
     }
   }
 
-  void AddObjectPriors(const std::vector<bool>& takes_part) {
+  void PrepareEllipsoids(const std::vector<bool>& takes_part) {
+    EllipsoidManifold* manifold = nullptr;  // the problem owns it, once for all objects
     for (int object = 0; object < graph_.num_objects(); ++object) {
       if (!takes_part[object]) continue;
+      if (!manifold) manifold = new EllipsoidManifold;
+      problem_.SetManifold(LandmarkAt(object), manifold);
       problem_.AddResidualBlock(SizePriorCost::Create(graph_.size_prior.log_mean[object],
                                                       graph_.size_prior.log_sigma[object]),
                                 nullptr,

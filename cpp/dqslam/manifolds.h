@@ -1,8 +1,15 @@
-// Ceres manifolds of the pose models: Plus and Minus of pose.h, tangent in the frame of the pose.
+// Ceres manifolds: how a step moves a pose and an ellipsoid.
+//
+//   pose       Plus and Minus of pose.h, tangent in the frame of the pose.
+//   ellipsoid  The tangent is that of its nine parameters, but the shape moves in a straight line,
+//              S + dS, rather than the factor.  A tilt l20 that the boxes hardly determine would
+//              otherwise enter S_zz, and with it the height of all boxes, as l20^2: the valley that
+//              results bends within millimetres and stops every minimiser.
 #pragma once
 
 #include <ceres/autodiff_manifold.h>
 
+#include "dqslam/ellipsoid.h"
 #include "dqslam/pose.h"
 
 namespace dqslam {
@@ -25,5 +32,15 @@ struct PoseManifoldFunctor {
 template <typename Pose>
 using PoseManifold =
     ceres::AutoDiffManifold<PoseManifoldFunctor<Pose>, Pose::kSize, Pose::kTangentSize>;
+
+class EllipsoidManifold : public ceres::Manifold {
+ public:
+  int AmbientSize() const override { return kLandmarkSize; }
+  int TangentSize() const override { return kLandmarkSize; }
+  bool Plus(const double* ellipsoid, const double* tangent, double* result) const override;
+  bool PlusJacobian(const double* ellipsoid, double* jacobian) const override;
+  bool Minus(const double* ellipsoid, const double* origin, double* tangent) const override;
+  bool MinusJacobian(const double* ellipsoid, double* jacobian) const override;
+};
 
 }  // namespace dqslam

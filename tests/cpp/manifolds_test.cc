@@ -68,5 +68,47 @@ TEST(Se3Manifold, PlusKeepsTheQuaternionUnit) {
   EXPECT_NEAR(x.tail(4).norm(), 1, 1e-13);
 }
 
+Vector RandomEllipsoid(Random& random) {
+  return EllipsoidFromAxes(
+      random.UniformVector<3>(-3, 3), random.UniformVector<3>(0.1, 2), random.UnitQuaternion());
+}
+
+TEST(EllipsoidManifold, InvariantsHoldAtRandomEllipsoids) {
+  const EllipsoidManifold manifold;
+  Random random(4);
+  for (const double size : {1e-6, 1e-2, 0.1}) {
+    for (int trial = 0; trial < 30; ++trial) {
+      const Vector x = RandomEllipsoid(random);
+      const Vector delta = size * random.UniformVector<9>(-1, 1);
+      const Vector y = RandomEllipsoid(random);
+      EXPECT_THAT_MANIFOLD_INVARIANTS_HOLD(manifold, x, delta, y, 1e-8);
+    }
+  }
+}
+
+// From the unit sphere, l20 moves S_xz and nothing else: (1 + t a)^T would add t^2 to S_zz.
+TEST(EllipsoidManifold, MovesTheShapeInAStraightLine) {
+  const EllipsoidManifold manifold;
+  const Vector sphere = Vector::Zero(9);
+  Vector moved(9);
+  ASSERT_TRUE(manifold.Plus(sphere.data(), Vector(0.3 * Vector::Unit(9, 7)).data(), moved.data()));
+  Eigen::Matrix3d expected = Eigen::Matrix3d::Identity();
+  expected(0, 2) = expected(2, 0) = 0.3;
+  EXPECT_TRUE(EllipsoidModel::Unpack(moved.data()).shape.isApprox(expected, 1e-14));
+}
+
+TEST(EllipsoidManifold, StaysAnEllipsoidHoweverLongTheStep) {
+  const EllipsoidManifold manifold;
+  Random random(5);
+  for (const double size : {1.0, 1e2, 1e4}) {
+    for (int trial = 0; trial < 30; ++trial) {
+      const Vector x = RandomEllipsoid(random), delta = size * random.UniformVector<9>(-1, 1);
+      Vector moved(9);
+      ASSERT_TRUE(manifold.Plus(x.data(), delta.data(), moved.data()));
+      EXPECT_TRUE(moved.allFinite()) << moved.transpose();
+    }
+  }
+}
+
 }  // namespace
 }  // namespace dqslam
