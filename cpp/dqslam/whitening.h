@@ -6,36 +6,32 @@
 #pragma once
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <stdexcept>
 
 #include "dqslam/blocks.h"
 
 namespace dqslam {
 
-/// Whether a covariance is finite, symmetric and positive definite by a margin over rounding.  The
-/// margin is that of the correlation matrix, so units do not matter.
-template <int kSize>
-bool IsCovariance(const Eigen::Matrix<double, kSize, kSize>& covariance) {
-  using Square = Eigen::Matrix<double, kSize, kSize>;
-  if (!covariance.allFinite() || !(covariance.diagonal().array() > 0).all()) return false;
-  const Eigen::Matrix<double, kSize, 1> sigma = covariance.diagonal().cwiseSqrt();
-  const Square correlation = covariance.array() / (sigma * sigma.transpose()).array();
-  if ((correlation - correlation.transpose()).cwiseAbs().maxCoeff() > 1e-9) return false;
-  const Eigen::SelfAdjointEigenSolver<Square> eigen(correlation, Eigen::EigenvaluesOnly);
-  return eigen.eigenvalues()[0] > 1e-12;
-}
-
-/// W with W^T W = covariance^-1; throws std::invalid_argument unless positive definite.
+/// W with W^T W = covariance^-1.  Throws std::invalid_argument unless the covariance is finite,
+/// symmetric and positive definite by a margin over rounding; the margin is that of the correlation
+/// matrix, so units do not matter.
 template <int kSize>
 Eigen::Matrix<double, kSize, kSize> SqrtInformation(
     const Eigen::Matrix<double, kSize, kSize>& covariance) {
   using Square = Eigen::Matrix<double, kSize, kSize>;
-  const Eigen::LLT<Square> cholesky(covariance);
-  if (!IsCovariance(covariance) || cholesky.info() != Eigen::Success) {
+  const Eigen::Matrix<double, kSize, 1> information =
+      covariance.diagonal().cwiseSqrt().cwiseInverse();
+  const Square correlation = information.asDiagonal() * covariance * information.asDiagonal();
+  const Eigen::LLT<Square> cholesky(correlation);
+  const Square L = cholesky.matrixL();
+  const bool positive_definite = covariance.allFinite() && information.allFinite() &&
+                                 cholesky.info() == Eigen::Success &&
+                                 L.diagonal().minCoeff() > 1e-6;
+  if (!positive_definite || (correlation - correlation.transpose()).cwiseAbs().maxCoeff() > 1e-9) {
     throw std::invalid_argument("covariance is not symmetric positive definite");
   }
-  return cholesky.matrixL().solve(Square::Identity());
+  const Square scale = information.asDiagonal();
+  return L.template triangularView<Eigen::Lower>().solve(scale);
 }
 
 /// residual = W error, for AutoDiff scalars.
