@@ -96,7 +96,10 @@ void BindOptions(py::module_& m) {
       .def_readwrite("function_tolerance",
                      &SolveOptions::function_tolerance,
                      "Stop when |change of cost| / cost falls below.")
-      .def_readwrite("grow_poses", &SolveOptions::grow_poses, "Poses added at a time.")
+      .def_readwrite("grow_poses", &SolveOptions::grow_poses, "Poses added at a time, or more:")
+      .def_readwrite("grow_rotation",
+                     &SolveOptions::grow_rotation,
+                     "While the sigma of odometry's rotation over them is below, radians.")
       .def_readwrite("grow_iterations",
                      &SolveOptions::grow_iterations,
                      "Levenberg-Marquardt steps after each addition.")

@@ -121,8 +121,7 @@ bool TangentDistances(const Surface<T>& in_camera,
     const double x = (box[edge] - principal[axis]) / focal[axis];
     const T squared = S(axis, axis) - 2 * x * S(axis, 2) + x * x * S(2, 2);
     if (!(squared > T(0))) return false;
-    (*distances)[edge] =
-        focal[axis] / depth * (outward * (p[axis] - x * p.z()) + sqrt(squared));
+    (*distances)[edge] = focal[axis] / depth * (outward * (p[axis] - x * p.z()) + sqrt(squared));
   }
   return true;
 }

@@ -7,6 +7,25 @@
 namespace dqslam {
 namespace {
 
+// The end of the poses to add behind `begin`: options.grow_poses of them, and more while the
+// rotation that odometry may have lost since `begin` stays small.
+int EndOfAddition(const PreparedGraph& prepared, const SolveOptions& options, int begin) {
+  const OdometryTable& odometry = prepared.graph.odometry;
+  const int k = prepared.graph.tangent_size();
+  const int rotations = prepared.graph.pose_model == PoseModel::kSe2 ? 1 : 3;
+  double variance = 0;
+  int end = begin;
+  for (; end < prepared.graph.num_poses(); ++end) {
+    if (end > 0) {
+      const double* covariance = odometry.covariance.row(prepared.odometry_into[end]).data();
+      for (int axis = k - rotations; axis < k; ++axis) variance += covariance[axis * k + axis];
+    }
+    const bool drifted = variance > options.grow_rotation * options.grow_rotation;
+    if (drifted && end - begin >= options.grow_poses) break;
+  }
+  return end;
+}
+
 Vector9d InModel(const Vector9d& ellipsoid, LandmarkModel model) {
   return model == LandmarkModel::kEllipsoid ? ellipsoid : DualQuadricFromEllipsoid(ellipsoid);
 }
@@ -64,17 +83,17 @@ Summary Grow(const PreparedGraph& prepared,
   const Graph& graph = prepared.graph;
   std::vector<bool> started(graph.num_objects(), false);
   Summary total;
-  for (int begin = 0; begin < graph.num_poses(); begin += options.grow_poses) {
+  for (int begin = 0, end = 0; begin < graph.num_poses(); begin = end) {
+    end = EndOfAddition(prepared, options, begin);
     Stage stage;
-    stage.end_pose = std::min(begin + options.grow_poses, graph.num_poses());
-    const bool last = stage.end_pose == graph.num_poses();
-    DeadReckon(prepared, begin, stage.end_pose, state);
+    stage.end_pose = end;
+    const bool last = end == graph.num_poses();
+    DeadReckon(prepared, begin, end, state);
     for (int object = 0; object < graph.num_objects(); ++object) {
       const std::vector<int>& rows = prepared.boxes_of_object[object];
-      const auto end = std::partition_point(rows.begin(), rows.end(), [&](int row) {
-        return graph.boxes.pose[row] < stage.end_pose;
-      });
-      const std::vector<int> seen(rows.begin(), end);
+      const auto behind = std::partition_point(
+          rows.begin(), rows.end(), [&](int row) { return graph.boxes.pose[row] < end; });
+      const std::vector<int> seen(rows.begin(), behind);
       if (!started[object] && (last || static_cast<int>(seen.size()) >= options.grow_min_views)) {
         state->landmarks.row(object) = StartObject(prepared, options, *state, object, seen);
         started[object] = true;

@@ -5,6 +5,7 @@
 #include <omp.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "dqslam/assembly.h"
@@ -43,6 +44,11 @@ class MonitorCallback : public ceres::IterationCallback {
   const Monitor& monitor_;
 };
 
+// The almost undamped steps ahead of dog-leg.
+constexpr double kFirstRadius = 1e8;
+constexpr int kFirstIterations = 6;
+constexpr double kFirstTolerance = 1e-5;
+
 ceres::Solver::Options CeresOptions(const Stage& stage) {
   ceres::Solver::Options ceres_options;
   ceres_options.trust_region_strategy_type =
@@ -75,11 +81,43 @@ Summary Summarize(const ceres::Solver::Summary& ceres_summary, const MonitorCall
   summary.rejected_steps = std::max(ceres_summary.num_unsuccessful_steps, 0);
   summary.gradient_norm_start = callback.first_gradient_norm;
   summary.gradient_norm_end = callback.last_gradient_norm;
-  // Ceres counts the starting point as a successful step.
-  const bool all_rejected = ceres_summary.num_successful_steps <= 1 && summary.rejected_steps > 0;
-  summary.converged = ceres_summary.termination_type == ceres::CONVERGENCE && !all_rejected;
-  if (all_rejected) summary.message = "every step was rejected: " + summary.message;
+  summary.converged = ceres_summary.termination_type == ceres::CONVERGENCE;
   return summary;
+}
+
+Summary Minimize(ceres::Solver::Options ceres_options,
+                 const Monitor& monitor,
+                 ceres::Problem* problem) {
+  MonitorCallback callback(monitor);
+  ceres_options.callbacks.push_back(&callback);
+  ceres::Solver::Summary ceres_summary;
+  ceres::Solve(ceres_options, problem, &ceres_summary);
+  if (callback.stopped) throw Interrupted();
+  return Summarize(ceres_summary, callback);
+}
+
+// The box residual starts near its minimum.  Powell's dog-leg follows the bent valleys of objects
+// whose tilt the boxes hardly determine, but Ceres' damps its Gauss-Newton step, which then creeps
+// along the weakest modes of a long trajectory.  A few almost undamped steps take those first.
+Summary PolishByDogleg(ceres::Solver::Options ceres_options,
+                       const Monitor& monitor,
+                       ceres::Problem* problem) {
+  ceres::Solver::Options first_options = ceres_options;
+  first_options.trust_region_strategy_type = ceres::LEVENBERG_MARQUARDT;
+  first_options.initial_trust_region_radius = kFirstRadius;
+  first_options.max_num_iterations = std::min(kFirstIterations, ceres_options.max_num_iterations);
+  first_options.function_tolerance = std::max(kFirstTolerance, ceres_options.function_tolerance);
+  const Summary first = Minimize(first_options, monitor, problem);
+  ceres_options.max_num_iterations -= first.iterations;
+  if (ceres_options.max_num_iterations == 0 || !std::isfinite(first.final_cost)) return first;
+
+  // In sigmas: a larger radius would only be halved step by step.
+  ceres_options.initial_trust_region_radius = std::sqrt(problem->NumResiduals() + 1);
+  Summary total = first;
+  Append(Minimize(ceres_options, monitor, problem), &total);
+  total.seconds += first.seconds;
+  total.gradient_norm_start = first.gradient_norm_start;
+  return total;
 }
 
 }  // namespace
@@ -92,15 +130,14 @@ Summary Optimize(const PreparedGraph& prepared,
   const SingleOpenMpThread single_thread;
   ceres::Problem problem;
   Assemble(prepared, options, stage, state, &problem);
-  ceres::Solver::Options ceres_options = CeresOptions(stage);
-  MonitorCallback callback(monitor);
-  ceres_options.callbacks.push_back(&callback);
-
-  ceres::Solver::Summary ceres_summary;
-  ceres::Solve(ceres_options, &problem, &ceres_summary);
-  if (callback.stopped) throw Interrupted();
-
-  return Summarize(ceres_summary, callback);
+  const bool polishes = stage.minimizer == Minimizer::kDogleg && stage.residual == Residual::kBox;
+  Summary summary = polishes ? PolishByDogleg(CeresOptions(stage), monitor, &problem)
+                             : Minimize(CeresOptions(stage), monitor, &problem);
+  if (summary.rejected_steps > 0 && summary.rejected_steps == summary.iterations) {
+    summary.converged = false;
+    summary.message = "every step was rejected: " + summary.message;
+  }
+  return summary;
 }
 
 Eigen::VectorXd BoxCosts(const PreparedGraph& prepared,

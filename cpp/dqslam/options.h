@@ -55,10 +55,11 @@ struct SolveOptions {
   double algebraic_sigma = 1.0;              ///< of both algebraic residuals, their own unit
   Minimizer minimizer = Minimizer::kDogleg;  ///< of the last stage
   int max_iterations = 300;                  ///< of each batch stage
-  double function_tolerance = 1e-10;         ///< stop when |change of cost| / cost falls below
-  int grow_poses = 10;                       ///< poses added at a time
+  double function_tolerance = 1e-7;          ///< stop when |change of cost| / cost falls below
+  int grow_poses = 64;                       ///< poses added at a time, or more:
+  double grow_rotation = 0.25;               ///< while odometry's own sigma is below, radians
   int grow_iterations = 10;                  ///< Levenberg-Marquardt steps after each addition
-  double grow_tolerance = 1e-3;              ///< function tolerance of these steps
+  double grow_tolerance = 1e-2;              ///< function tolerance of these steps
   int grow_min_views = 8;                    ///< boxes an object needs before it is started
 };
 

@@ -22,6 +22,7 @@ void ValidateOptions(const SolveOptions& options) {
   require(options.max_iterations > 0, "max_iterations must be positive");
   require(options.function_tolerance > 0, "function_tolerance must be positive");
   require(options.grow_poses > 0, "grow_poses must be positive");
+  require(options.grow_rotation >= 0, "grow_rotation must not be negative");
   require(options.grow_iterations > 0, "grow_iterations must be positive");
   require(options.grow_min_views > 0, "grow_min_views must be positive");
 }
@@ -43,11 +44,8 @@ void ValidateStart(const Graph& graph, const State& start) {
 
 class Solver {
  public:
-  Solver(const Graph& graph, const SolveOptions& options, const Monitor& monitor)
-      : graph_(graph),
-        options_(options),
-        monitor_(monitor),
-        prepared_(graph, options.mode == Mode::kMapping) {}
+  Solver(const PreparedGraph& prepared, const SolveOptions& options, const Monitor& monitor)
+      : graph_(prepared.graph), options_(options), monitor_(monitor), prepared_(prepared) {}
 
   /// Whether objects remain where their boxes say that they cannot be.
   bool LeavesObjectsStuck(const State& state) const {
@@ -122,19 +120,24 @@ class Solver {
     Stage stage = BatchStage(prepared_, options_);
     stage.residual = residual;
     stage.loss = loss;
-    return Optimize(prepared_, options_, stage, monitor_, state);
+    const bool all_defined =
+        residual != Residual::kBox || BoxCosts(prepared_, options_, *state).allFinite();
+    Summary summary = Optimize(prepared_, options_, stage, monitor_, state);
+    // Boxes that were undefined at the start have used the tangent residual until here.
+    if (!all_defined) Append(Optimize(prepared_, options_, stage, monitor_, state), &summary);
+    return summary;
   }
 
   const Graph& graph_;
   const SolveOptions& options_;
   const Monitor& monitor_;
-  const PreparedGraph prepared_;
+  const PreparedGraph& prepared_;
 };
 
 // Grows again in smaller steps, up to two times, where objects are stuck or the last stage did not
 // converge, and keeps the lowest cost.  With a robust loss an object may well have outliers only:
 // there it grows once.
-Summary SolveInAttempts(const Graph& graph,
+Summary SolveInAttempts(const PreparedGraph& prepared,
                         const SolveOptions& options,
                         const std::optional<State>& start,
                         const Monitor& monitor,
@@ -145,8 +148,9 @@ Summary SolveInAttempts(const Graph& graph,
   SolveOptions variant = options;
   Summary best;
   for (int attempt = 0; attempt < (repeats ? 3 : 1); ++attempt) {
-    variant.grow_poses = std::max(options.grow_poses >> attempt, 1);
-    Solver solver(graph, variant, monitor);
+    variant.grow_poses = std::max(options.grow_poses >> 2 * attempt, 1);
+    variant.grow_rotation = options.grow_rotation / (1 << 2 * attempt);
+    Solver solver(prepared, variant, monitor);
     State reached;
     const Summary summary = solver.Run(start, &reached);
     if (attempt == 0 || summary.final_cost < best.final_cost) {
@@ -167,10 +171,11 @@ Solution Solve(const Graph& graph,
   const auto begin = std::chrono::steady_clock::now();
   ValidateOptions(options);
   if (start) ValidateStart(graph, *start);
+  const PreparedGraph prepared(graph, options.mode == Mode::kMapping);
   State state;
   Solution solution;
-  solution.summary = SolveInAttempts(graph, options, start, monitor, &state);
-  const Solver solver(graph, options, monitor);
+  solution.summary = SolveInAttempts(prepared, options, start, monitor, &state);
+  const Solver solver(prepared, options, monitor);
   solution.svd_singular_values = options.start == Start::kSvd
                                      ? solver.SvdSingularValues()
                                      : RowMatrix::Constant(graph.num_objects(), 10, std::nan(""));

@@ -382,10 +382,17 @@ class SolveOptions:
     @property
     def grow_poses(self) -> int:
         """
-        Poses added at a time.
+        Poses added at a time, or more:
         """
     @grow_poses.setter
     def grow_poses(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    @property
+    def grow_rotation(self) -> float:
+        """
+        While the sigma of odometry's rotation over them is below, radians.
+        """
+    @grow_rotation.setter
+    def grow_rotation(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
     @property
     def grow_tolerance(self) -> float:
         """

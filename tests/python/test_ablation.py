@@ -61,7 +61,7 @@ def test_ours_reaches_the_optimum_and_the_papers_does_not(table):
     assert (ours.optimum_rate, papers.optimum_rate) == (1.0, 0.0)
     assert 0.2 < ours.error_over_bound < 4.0  # one draw of an error whose expectation is 1
     assert papers.error_over_bound > 5.0 * ours.error_over_bound
-    assert ours.iterations_med > 50
+    assert ours.iterations_med > 10
     assert ours.seconds_med > 0.0
 
 
