@@ -11,8 +11,9 @@ namespace dqslam {
 
 /// Columns: the tangents of the free poses in their order, then the parameters of all objects.
 struct Information {
-  Eigen::SparseMatrix<double> jacobian;  ///< of the residuals, in sigmas; of odometry, then boxes, then the rest
-  Eigen::SparseMatrix<double> matrix;    ///< H
+  Eigen::SparseMatrix<double>
+      jacobian;  ///< of the residuals, in sigmas; of odometry, then boxes, then the rest
+  Eigen::SparseMatrix<double> matrix;  ///< H
   Eigen::VectorXd residuals;
   std::vector<int> block_sizes;  ///< of the free poses and the objects
   int first_free_pose = 1;

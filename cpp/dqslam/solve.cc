@@ -136,7 +136,7 @@ class Solver {
 
 // Grows again in smaller steps, up to two times, where objects are stuck or the last stage did not
 // converge, and keeps the lowest cost.  With a robust loss an object may well have outliers only:
-// there it grows once.
+// there it grows once, in smaller steps from the first.
 Summary SolveInAttempts(const PreparedGraph& prepared,
                         const SolveOptions& options,
                         const std::optional<State>& start,
@@ -148,8 +148,9 @@ Summary SolveInAttempts(const PreparedGraph& prepared,
   SolveOptions variant = options;
   Summary best;
   for (int attempt = 0; attempt < (repeats ? 3 : 1); ++attempt) {
-    variant.grow_poses = std::max(options.grow_poses >> 2 * attempt, 1);
-    variant.grow_rotation = options.grow_rotation / (1 << 2 * attempt);
+    const int halvings = 2 * (IsRobust(options.loss) ? 1 : attempt);
+    variant.grow_poses = std::max(options.grow_poses >> halvings, 1);
+    variant.grow_rotation = options.grow_rotation / (1 << halvings);
     Solver solver(prepared, variant, monitor);
     State reached;
     const Summary summary = solver.Run(start, &reached);
