@@ -163,12 +163,13 @@ class Assembler {
     EllipsoidManifold* manifold = nullptr;  // the problem owns it, once for all objects
     for (int object = 0; object < graph_.num_objects(); ++object) {
       if (!takes_part[object]) continue;
-      if (!manifold) manifold = new EllipsoidManifold;
-      problem_.SetManifold(LandmarkAt(object), manifold);
+      // The prior first: it may be all there is of an object whose boxes have no weight.
       problem_.AddResidualBlock(SizePriorCost::Create(graph_.size_prior.log_mean[object],
                                                       graph_.size_prior.log_sigma[object]),
                                 nullptr,
                                 LandmarkAt(object));
+      if (!manifold) manifold = new EllipsoidManifold;
+      problem_.SetManifold(LandmarkAt(object), manifold);
       const ScenePriors& scene = graph_.scene_priors;
       if (scene.upright_sigma > 0) {
         problem_.AddResidualBlock(
