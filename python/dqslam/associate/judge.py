@@ -26,8 +26,8 @@ NOT_HALF = 0.5
 MEDIAN_CHI2 = 3.36
 # An object moved when without it the path explains its boxes worse than this, and with it pays
 # this much: chi-squares a box.
-BENT = 8.0
-PAID = 1.7
+BENT = 13.28
+PAID = 2.0
 LEAST_BOXES = 8
 # Share of the boxes of an id that one place explains, at least.
 LEAST_FIT = 0.5
@@ -150,14 +150,37 @@ def find_movers(scene: SceneMap) -> dict[int, str]:
     """Return objects that are at rest only if the path bends to them.
 
     Each in turn is left out of the estimate. If it moved, its boxes do not fit any place then, and
-    the cost that it causes, to the path and to the other objects as well, is gone.
+    the cost that it causes, to the path and to the other objects as well, is gone. An object at
+    rest may look the same as long as one that moved bends the path: the worst comes first, and the
+    others are tried again without it.
     """
-    movers = {}
-    with_all = scene.cost(max_iterations=LEAVE_ONE_OUT_ITERATIONS)
-    alive = np.flatnonzero(scene.box_counts >= LEAST_BOXES)
-    for number in alive[~np.isin(alive, list(scene.left_out))].tolist():
+    part = np.flatnonzero(scene.box_counts > 0)
+    part = part[~np.isin(part, list(scene.left_out))]
+    if len(part) < 2:  # nothing else tells the path
+        return {}
+    alive = part[scene.box_counts[part] >= LEAST_BOXES].tolist()
+    fits = _fits_without(scene, alive, movers={})
+    movers: dict[int, str] = {}
+    for number in sorted(fits, key=lambda one: -fits[one]):
+        fit = _fits_without(scene, [number], movers).get(number) if movers else fits[number]
+        if fit is not None:
+            movers[number] = (
+                "without it, the path explains its boxes "
+                f"{fit / MEDIAN_CHI2:.0f} times worse than chance: it moved"
+            )
+    return movers
+
+
+def _fits_without(scene: SceneMap, objects: list[int], movers: dict[int, str]) -> dict[int, float]:
+    """Return those of some objects that bend the path, and how their boxes fit if they may not.
+
+    The median chi-square of an object's boxes at one place, movers taking no part.
+    """
+    fits = {}
+    with_all = scene.cost(max_iterations=LEAVE_ONE_OUT_ITERATIONS, without=movers)
+    for number in objects:
         rows = np.flatnonzero(scene.box_object == number)
-        without = scene.cost(max_iterations=LEAVE_ONE_OUT_ITERATIONS, without=number)
+        without = scene.cost(max_iterations=LEAVE_ONE_OUT_ITERATIONS, without=[*movers, number])
         paid = 2.0 * (with_all.cost - without.cost) / len(rows)
         if paid < PAID:
             continue
@@ -165,8 +188,5 @@ def find_movers(scene: SceneMap) -> dict[int, str]:
             ellipsoids, _ = scene.fit_groups([rows])
             fit = scene.chi2(rows, np.tile(ellipsoids, (len(rows), 1)), blur=0.0)
         if np.median(fit) > BENT:
-            movers[number] = (
-                "without it, the path explains its boxes "
-                f"{np.median(fit) / MEDIAN_CHI2:.0f} times worse than chance: it moved"
-            )
-    return movers
+            fits[number] = float(np.median(fit))
+    return fits

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import NamedTuple
@@ -182,11 +182,10 @@ class SceneMap:
             log_size = float(np.median(self.log_sizes()[graph.object_ids]))
             self.size_prior = SizePrior(log_mean=log_size, log_sigma=LOG_SIZE_SIGMA)
 
-    def cost(self, *, max_iterations: int, without: int | None = None) -> Outcome:
-        """Return what an estimate costs, with or without one object; the map stays as it is."""
+    def cost(self, *, max_iterations: int, without: Collection[int] = ()) -> Outcome:
+        """Return what an estimate costs without some objects; the map stays as it is."""
         left_out = self.left_out
-        if without is not None:
-            self.left_out = {**left_out, without: "on trial"}
+        self.left_out = left_out | dict.fromkeys(without, "on trial")
         graph = self.graph()
         self.left_out = left_out
         if graph is None:
