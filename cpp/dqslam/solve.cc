@@ -87,6 +87,7 @@ class Solver {
       Append(GraduateNonConvexity(prepared_, options_, monitor_, state), &summary);
       return summary;
     }
+    if (options_.loss == Loss::kSwitchable) SetSwitches(state);
     Append(Batch(BatchStage(prepared_, options_).residual, options_.loss, state), &summary);
     if (Refines()) {
       RestartStuckObjects(prepared_, options_, monitor_, state, &summary);
@@ -107,6 +108,13 @@ class Solver {
     StartAll(state);
     const Loss loss = IsRobust(options_.loss) ? Loss::kCauchy : Loss::kNone;
     return Refines() ? Batch(Residual::kTangent, loss, state) : Summary();
+  }
+
+  // The minimum of s^2 chi^2 + phi (1 - s)^2: with all boxes switched on, the first steps would leave
+  // what the Cauchy loss has reached.
+  void SetSwitches(State* state) const {
+    const double phi = options_.outlier_chi_square;
+    state->switches = phi / (phi + 2 * BoxCosts(prepared_, options_, *state).array());
   }
 
   void StartAll(State* state) {
