@@ -146,6 +146,10 @@ def test_same_seed_same_files(files):
         (("--odometry-noise", "translation=0,rotation=1"), "translation is 0, not between"),
         (("--odometry-noise", "translation=1,rotation=nan"), "rotation is nan, not between"),
         (("--seed", "-1"), "'--seed'"),
+        (("--hold-out", "1"), "'--hold-out'"),
+        (("--trust-ids", "0.4"), "'--trust-ids'"),
+        (("--trust-ids", "0.5"), "trust in ids is 0.5, not above 0.5 and at most 1"),
+        (("--format", "zip"), "zip"),
     ],
 )
 def test_bad_arguments_are_one_line_and_code_2(files, capsys, arguments, message):
@@ -191,3 +195,78 @@ def test_an_output_that_is_a_file(files, capsys):
 def test_parse_noise():
     assert parse_noise("--x", "rotation=0.5, translation=1e-2") == OdometryNoise(0.01, 0.5)
     assert parse_noise("--x", None) is None
+
+
+# --- without ids, boxes held out, and nothing to map
+
+
+def test_without_ids(files, orbit, capsys):
+    assert call(files, *PERTURB, "--seed", "1", "--ids", "none", "--hold-out", "0.25") == 0
+    content = report(files)
+    assert (content["ids"], content["trust_ids"]) == ("none", None)
+    assert len(content["objects"]) == len(NAMES)
+    error = content["trajectory_error"]
+    assert error["after"]["ate_rmse_m"] < 0.5 * error["before"]["ate_rmse_m"]
+    tested = content["reprojection"]
+    assert (tested["boxes"], tested["held_out"], tested["explained_share"]) == (40, True, 1.0)
+    shown = capsys.readouterr().out
+    assert f"median IoU {tested['iou_median']:.2f} of the boxes held out; 100% of those" in shown
+
+
+def test_ids_that_are_not_final(files):
+    assert call(files, *PERTURB, "--trust-ids", "0.9") == 0
+    content = report(files)
+    assert content["trust_ids"] == 0.9
+    assert [entry["id"] for entry in content["objects"]] == [0, 1, 2, 3]
+
+
+def test_the_level_of_the_noise_is_estimated_unless_it_is_known(files, capsys):
+    assert call(files) == 0
+    noise = report(files)["odometry_noise"]
+    assert noise["from"] == "estimated"
+    line = f"estimated: {1e3 * noise['translation_m']:.2f} mm"
+    assert line in capsys.readouterr().out
+    assert call(files, *PERTURB) == 0
+    assert report(files)["odometry_noise"] == {"from": "given"}
+
+
+@pytest.mark.parametrize("ids", ["none", "track_id"])
+def test_nothing_at_rest_is_said(files, capsys, ids):
+    lines = files[2].read_text().splitlines()
+    random = np.random.default_rng(0)
+    for row in range(1, len(lines)):
+        cells = lines[row].split(",")
+        x, y = random.uniform([0, 0], [500, 400]).tolist()
+        cells[2:6] = map(repr, (x, y, x + 60, y + 60))
+        lines[row] = ",".join(cells)
+    files[2].write_text("\n".join(lines) + "\n")
+    assert call(files, "--ids", ids) == 0
+    shown = capsys.readouterr().out
+    assert "no object fits a world at rest: the trajectory is the odometry" in shown
+    assert "no box shows an object of the map" in shown
+    assert report(files)["objects"] == []
+    assert ("object 101 is not in the map: no place explains its boxes" in shown) == (
+        ids == "track_id"
+    )
+    out = files[0].parent / "out"
+    estimate, odometry = (
+        read_trajectory(out / name)[1] for name in ("trajectory.txt", "odometry.txt")
+    )
+    np.testing.assert_array_equal(estimate, odometry)
+
+
+def test_frames_without_times(files, orbit):
+    """YOLO and MOT count frames: the rate tells their times."""
+    mot = files[0].parent / "det.txt"
+    rows = []
+    for (pose, name), box in orbit.boxes.items():
+        x1, y1, x2, y2 = box.tolist()
+        rows.append(f"{pose + 1},{name},{x1!r},{y1!r},{x2 - x1!r},{y2 - y1!r},0.9,1,1")
+    mot.write_text("\n".join(rows) + "\n")
+    times = files[0].parent / "times.txt"
+    times.write_text("".join(f"{time!r}\n" for time in orbit.times.tolist()))
+    more = ("--format", "mot", "--frame-times", str(times), "--mode", "mapping")
+    assert call((files[0], files[1], mot), *more) == 0
+    content = report(files)
+    assert content["boxes"]["count"] == 160
+    assert [entry["id"] for entry in content["objects"]] == list(NAMES)

@@ -16,6 +16,7 @@ from dqslam.run_recording import (
     run,
     with_cut_edges,
 )
+from dqslam.run_recording.hold_out import choose_held_out, describe_overlap
 from dqslam.size_prior import SizePrior, SizePriors
 from orbit import CAMERA, NAMES, make_orbit, write_orbit
 
@@ -458,3 +459,129 @@ def test_relative_positions_take_no_part(files):
     wrong = RelativePositions([5], [101], [[0.0, 0.0, 50.0]], [1e-6 * np.eye(3)])
     with_them = run(replace(recording, positions=wrong)).estimate
     np.testing.assert_array_equal(with_them.poses, run(recording).estimate.poses)
+
+
+# --- boxes held out
+
+
+def test_held_out_boxes_take_no_part(files):
+    """Moved anywhere, they change nothing of the estimate."""
+    recording, _ = load_recording(*files, ids="none")
+    noisy = perturb_odometry(recording, NOISE, seed=0)
+    options = {"trust_ids": 0.9, "hold_out": 0.25, "seed": 3, "estimates_noise": True}
+    first = run(noisy, **options)
+    assert first.held_out.sum() == 40
+    box = noisy.detections.box.copy()
+    box[first.held_out] = [300.0, 200.0, 310.0, 210.0]
+    other = run(with_boxes(noisy, box=box), **options)
+    np.testing.assert_array_equal(other.held_out, first.held_out)
+    np.testing.assert_array_equal(other.estimate.poses, first.estimate.poses)
+    np.testing.assert_array_equal(other.estimate.ellipsoids, first.estimate.ellipsoids)
+    tested = [one.report["reprojection"] for one in (first, other)]
+    assert [one["boxes"] for one in tested] == [40, 40]
+    assert tested[0]["iou_median"] > 0.85
+    assert tested[0]["explained_share"] == 1.0
+    assert tested[1]["explained_share"] == 0.0
+
+
+def test_held_out_boxes_are_called_what_they_show(files):
+    recording, _ = load_recording(*files)
+    result = run(recording, hold_out=0.25)
+    np.testing.assert_array_equal(result.detections.object_id, recording.detections.object_id)
+    assert result.report["reprojection"]["held_out"]
+    assert result.report["boxes"]["count"] == 120
+    assert not run(recording).report["reprojection"]["held_out"]
+
+
+def test_boxes_are_held_out_by_the_seed():
+    chosen = choose_held_out(1000, 0.3, seed=1)
+    assert chosen.sum() == 300
+    np.testing.assert_array_equal(chosen, choose_held_out(1000, 0.3, seed=1))
+    assert not np.array_equal(chosen, choose_held_out(1000, 0.3, seed=2))
+    assert not choose_held_out(1000, 0.0, seed=1).any()
+
+
+@pytest.mark.parametrize("share", [-0.1, 1.0, 2.0, float("nan")])
+def test_shares_to_hold_out_must_make_sense(files, share):
+    with pytest.raises(ValueError, match="the share to hold out is .*, not at least 0 and below 1"):
+        run(load_recording(*files)[0], hold_out=share)
+
+
+def test_overlaps_are_described():
+    overlap = np.array([0.9, 0.4, 0.0, np.nan, 0.8])
+    assert describe_overlap(overlap) == {
+        "boxes": 5,
+        "of_mapped_classes": 4,
+        "matched": 3,
+        "iou_median": pytest.approx(0.8),
+        "explained_share": 0.5,
+    }
+
+
+# --- without ids, and with ids that are not final
+
+
+def test_boxes_without_ids_give_the_same_map(files, orbit):
+    recording, dropped = load_recording(*files, ids="none")
+    assert dropped.total == 0
+    assert np.all(recording.detections.object_id == -1)
+    truth = Trajectory(orbit.times, orbit.poses)
+    noisy = perturb_odometry(recording, NOISE, seed=1)
+    result = run(noisy, trust_ids=0.9, reference=truth)
+    error = result.report["trajectory_error"]
+    assert error["after"]["ate_rmse_m"] < 0.4 * error["before"]["ate_rmse_m"]
+    assert [entry["observations"] for entry in result.report["objects"]] == [40] * 4
+    np.testing.assert_array_equal(result.estimate.object_ids, range(4))
+    assert sorted(result.estimate.class_names) == sorted(NAMES.values())
+
+
+def test_without_ids_the_odometry_may_be_the_truth(files, orbit):
+    recording, _ = load_recording(*files, ids="none")
+    result = run(recording, trust_ids=0.9, mode=_core.Mode.MAPPING, estimates_noise=True)
+    np.testing.assert_allclose(result.estimate.poses[:, :3], orbit.poses[:, :3], atol=1e-9)
+    assert result.report["odometry_noise"] == {"from": "given"}
+    centers = {
+        name: place for name, place in zip(NAMES.values(), orbit.centers.values(), strict=True)
+    }
+    for name, center in zip(result.estimate.class_names, result.estimate.centers, strict=True):
+        np.testing.assert_allclose(center, centers[name], atol=0.01)
+
+
+def test_the_noise_of_odometry_is_told_when_it_is_estimated(files):
+    recording, _ = load_recording(*files)
+    noise = run(perturb_odometry(recording, NOISE, seed=0), estimates_noise=True).report
+    noise = noise["odometry_noise"]
+    assert noise["from"] == "estimated"
+    assert noise["translation_m"] == pytest.approx(0.01, rel=0.5)
+    assert noise["rotation_rad"] == pytest.approx(0.01, rel=0.5)
+
+
+def test_ids_that_are_not_final_keep_boxes_without_one(files, orbit):
+    time = orbit.times[3].item()
+    add_rows(files[2], f"3,{time!r},1,1,9,9,0.5,1,cup,", f"3,{time!r},20,1,30,9,0.8,1,cup,101")
+    final, dropped = load_recording(*files)
+    assert (len(final.detections), dropped.without_id, dropped.repeated) == (160, 1, 1)
+    open_, dropped = load_recording(*files, final_ids=False)
+    assert (len(open_.detections), dropped.total) == (162, 0)
+    assert np.sum(open_.detections.object_id == -1) == 1
+
+
+def test_of_several_images_at_a_pose_the_nearest_is_whole(files, orbit):
+    """An image 0.03 s late has two boxes: all of it is left out, or all of another."""
+
+    def tenfold(lines):
+        rows = (line.split(",", 1) for line in lines[1:])
+        return [lines[0], *(f"{frame}0,{rest}" for frame, rest in rows)]
+
+    edit(files[2], tenfold)
+    time = orbit.times[3].item() + 0.03
+    add_rows(files[2], *(f"35,{time!r},{x},5,{x + 9},14,0.9,1,cup,{x}" for x in (5, 50)))
+    recording, dropped = load_recording(*files, ids="none")
+    assert dropped.repeated == 2
+    assert np.sum(recording.detections.pose == 3) == 4
+    edit(files[2], lambda lines: [line for line in lines if not line.startswith("30,")])
+    recording, dropped = load_recording(*files, ids="none")
+    assert dropped.repeated == 0
+    np.testing.assert_array_equal(
+        recording.detections.box[recording.detections.pose == 3], [[5, 5, 14, 14], [50, 5, 59, 14]]
+    )
