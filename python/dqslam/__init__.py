@@ -6,6 +6,8 @@ from dqslam._core import PoseModel as PoseModel
 from dqslam._core import ScenePriors as ScenePriors
 from dqslam._core import SolveOptions as SolveOptions
 from dqslam._core import Summary as Summary
+from dqslam.associate import Association as Association
+from dqslam.associate import associate as associate
 from dqslam.estimate import Estimate as Estimate
 from dqslam.evaluate import Report as Report
 from dqslam.evaluate import absolute_trajectory_error as absolute_trajectory_error

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dqslam import _core, associate
+from dqslam import _core
+from dqslam.associate import gating
 from dqslam.estimate import Estimate
 from dqslam.evaluate import absolute_trajectory_error
 from dqslam.evaluate_results import common_poses
@@ -29,7 +30,7 @@ def box_chi2(estimate: Estimate, detections: Detections, noise: BoxNoise) -> NDA
         max=len(estimate.object_ids) - 1
     )
     mapped = estimate.is_ellipsoid[row] & (estimate.object_ids[row] == detections.object_id)
-    chi2 = associate.box_chi2(
+    chi2 = gating.box_chi2(
         estimate.camera,
         estimate.pose_model,
         estimate.poses[detections.pose],
@@ -76,7 +77,7 @@ def describe_boxes(chi2: NDArray[np.float64]) -> dict[str, Any]:
     return {
         "count": len(chi2),
         "chi2_median": float(np.median(chi2)) if len(chi2) else None,
-        "outlier_share": float(np.mean(chi2 > associate.CHI2_GATE[4])) if len(chi2) else None,
+        "outlier_share": float(np.mean(chi2 > gating.CHI2_GATE[4])) if len(chi2) else None,
         "not_in_front": int(np.sum(np.isinf(chi2))),
     }
 
