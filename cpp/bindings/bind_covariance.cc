@@ -38,8 +38,9 @@ void BindCovariance(py::module_& m) {
         "Joint covariance of some poses (k rows each), then objects (9 rows each).");
 
   py::class_<Fit>(m, "Fit", "How well measurements fit an estimate.")
-      .def_readonly(
-          "odometry_residuals", &Fit::odometry_residuals, "In sigmas, shape (n, k), one row a step.")
+      .def_readonly("odometry_residuals",
+                    &Fit::odometry_residuals,
+                    "In sigmas, shape (n, k), one row a step.")
       .def_readonly("odometry_leverage",
                     &Fit::odometry_leverage,
                     "0..1, shape (n, k): 1 where the step alone determines what it measures.")

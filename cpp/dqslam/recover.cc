@@ -3,12 +3,16 @@
 #include <algorithm>
 #include <numeric>
 
+#include "dqslam/dispatch.h"
 #include "dqslam/grow.h"
 
 namespace dqslam {
 namespace {
 
+// Most boxes of an object beyond this, or all in the mean beyond twice as much: it is stuck.
 constexpr double kImpossibleBox = 13.28;  // chi-square of 4 degrees of freedom, 99 %
+constexpr double kImpossibleMean = 2 * kImpossibleBox;
+constexpr double kTorn = 5;  // chi-square of odometry, per degree of freedom
 constexpr int kMaxRestarts = 2;
 constexpr int kFewBoxes = 3;
 
@@ -33,9 +37,28 @@ std::vector<bool> StuckObjects(const PreparedGraph& prepared,
     for (const int row : rows) chi_squares.push_back(2 * costs[row]);
     const auto middle = chi_squares.begin() + chi_squares.size() / 2;
     std::nth_element(chi_squares.begin(), middle, chi_squares.end());
-    stuck.push_back(*middle > kImpossibleBox);
+    const double sum = std::accumulate(chi_squares.begin(), chi_squares.end(), 0.0);
+    stuck.push_back(*middle > kImpossibleBox || sum > kImpossibleMean * chi_squares.size());
   }
   return stuck;
+}
+
+bool IsTorn(const PreparedGraph& prepared, const State& state) {
+  const OdometryTable& odometry = prepared.graph.odometry;
+  double chi_square = 0;
+  Dispatch(prepared.graph.pose_model, [&](auto model) {
+    using Pose = decltype(model);
+    for (int row = 0; row < odometry.size(); ++row) {
+      Eigen::Matrix<double, Pose::kSize, 1> predicted;
+      Eigen::Matrix<double, Pose::kTangentSize, 1> error;
+      Pose::Compose(state.poses.row(odometry.from[row]).data(),
+                    odometry.relative.row(row).data(),
+                    predicted.data());
+      Minus<Pose>(predicted.data(), state.poses.row(odometry.to[row]).data(), error.data());
+      chi_square += (prepared.odometry_sqrt_information[row] * error).squaredNorm();
+    }
+  });
+  return chi_square > kTorn * odometry.size() * prepared.graph.tangent_size();
 }
 
 Stage BatchStage(const PreparedGraph& prepared, const SolveOptions& options) {

@@ -8,10 +8,14 @@ namespace dqslam {
 /// The last stage: all poses and all boxes, with the last residual of the options.
 Stage BatchStage(const PreparedGraph& prepared, const SolveOptions& options);
 
-/// Objects whose typical box is impossible by the noise model.
+/// Objects whose boxes are impossible by the noise model, most of them or in the mean.
 std::vector<bool> StuckObjects(const PreparedGraph& prepared,
                                const SolveOptions& options,
                                const State& state);
+
+/// Whether odometry fits so badly that a part of the path must lie the wrong way round: boxes fit
+/// there as well, of a place that is turned by a whole turn more than odometry says.
+bool IsTorn(const PreparedGraph& prepared, const State& state);
 
 /// Objects of few boxes have several minima, in depth above all: starts each of them at the depth
 /// of the prior size as well, minimises all, and keeps what lowers the cost.

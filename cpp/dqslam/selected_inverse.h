@@ -5,7 +5,8 @@
 
 namespace dqslam {
 
-/// H^-1 on the pattern of its Cholesky factor (Takahashi, Fagan & Chin 1973), which holds that of H.
+/// H^-1 on the pattern of its Cholesky factor (Takahashi, Fagan & Chin 1973), which holds that of
+/// H.
 class SelectedInverse {
  public:
   /// Throws std::runtime_error when H is not positive definite.

@@ -53,6 +53,8 @@ class Solver {
     return std::any_of(stuck.begin(), stuck.end(), [](bool is_stuck) { return is_stuck; });
   }
 
+  bool LeavesPathTorn(const State& state) const { return IsTorn(prepared_, state); }
+
   /// Of every object's linear fit at the initial poses; NaN where it has fewer than 3 views.
   RowMatrix SvdSingularValues() const {
     State state{graph_.initial_poses, RowMatrix()};
@@ -110,8 +112,8 @@ class Solver {
     return Refines() ? Batch(Residual::kTangent, loss, state) : Summary();
   }
 
-  // The minimum of s^2 chi^2 + phi (1 - s)^2: with all boxes switched on, the first steps would leave
-  // what the Cauchy loss has reached.
+  // The minimum of s^2 chi^2 + phi (1 - s)^2: with all boxes switched on, the first steps would
+  // leave what the Cauchy loss has reached.
   void SetSwitches(State* state) const {
     const double phi = options_.outlier_chi_square;
     state->switches = phi / (phi + 2 * BoxCosts(prepared_, options_, *state).array());
@@ -142,9 +144,9 @@ class Solver {
   const PreparedGraph& prepared_;
 };
 
-// Grows again in smaller steps, up to two times, where objects are stuck or the last stage did not
-// converge, and keeps the lowest cost.  With a robust loss an object may well have outliers only:
-// there it grows once, in smaller steps from the first.
+// Grows again in smaller steps, up to two times, where objects are stuck, the path is torn or the
+// last stage did not converge, and keeps the lowest cost.  With a robust loss an object may well
+// have outliers only: there it grows once, in smaller steps from the first.
 Summary SolveInAttempts(const PreparedGraph& prepared,
                         const SolveOptions& options,
                         const std::optional<State>& start,
@@ -166,7 +168,9 @@ Summary SolveInAttempts(const PreparedGraph& prepared,
       best = summary;
       *state = reached;
     }
-    if (best.converged && !solver.LeavesObjectsStuck(*state)) break;
+    if (best.converged && !solver.LeavesObjectsStuck(*state) && !solver.LeavesPathTorn(*state)) {
+      break;
+    }
   }
   return best;
 }

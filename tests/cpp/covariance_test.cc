@@ -134,9 +134,8 @@ TEST(ComputeFit, LeverageTellsTheMeanSquaredResidual) {
   double squares = 0, redundancy = 0, box_squares = 0, box_redundancy = 0;
   for (int run = 0; run < kRuns; ++run) {
     for (int edge = 0; edge < exact.size(); ++edge) {
-      const Eigen::Vector3d noise = 0.02 * Eigen::Vector3d::NullaryExpr([&](Eigen::Index) {
-                                      return random.Normal();
-                                    });
+      const Eigen::Vector3d noise =
+          0.02 * Eigen::Vector3d::NullaryExpr([&](Eigen::Index) { return random.Normal(); });
       Plus<Se2>(exact.relative.row(edge).data(),
                 noise.data(),
                 scene.graph.odometry.relative.row(edge).data());

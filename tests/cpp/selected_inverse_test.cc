@@ -42,7 +42,8 @@ TEST(SelectedInverseTest, AgreesWithTheDenseInverse) {
   int offset = 0;
   for (size_t b = 0; b < sizes.size(); ++b) {
     const Eigen::MatrixXd expected = inverse.block(offset, offset, sizes[b], sizes[b]);
-    EXPECT_LT((selected.Block(offset, sizes[b]) - expected).norm(), 1e-9 * expected.norm()) << "block " << b;
+    EXPECT_LT((selected.Block(offset, sizes[b]) - expected).norm(), 1e-9 * expected.norm())
+        << "block " << b;
     offset += sizes[b];
   }
 }

@@ -127,7 +127,7 @@ TYPED_TEST(SolveOf, MappingRecoversObjectsAndLeavesPoses) {
       this->options_.residual = residual;
       const Solution solution = Solve(graph, this->options_, {});
       // Up to the rounding that normalises quaternions.
-    EXPECT_LT((solution.poses - this->scene_.truth.poses).cwiseAbs().maxCoeff(), 1e-15);
+      EXPECT_LT((solution.poses - this->scene_.truth.poses).cwiseAbs().maxCoeff(), 1e-15);
       this->ExpectTruth(solution);
     }
   }
