@@ -1,6 +1,7 @@
 #include "dqslam/recover.h"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 
 #include "dqslam/dispatch.h"
@@ -12,7 +13,8 @@ namespace {
 // Most boxes of an object beyond this, or all in the mean beyond twice as much: it is stuck.
 constexpr double kImpossibleBox = 13.28;  // chi-square of 4 degrees of freedom, 99 %
 constexpr double kImpossibleMean = 2 * kImpossibleBox;
-constexpr double kTorn = 5;  // chi-square of odometry, per degree of freedom
+constexpr double kImpossibleSize = 21.1;  // chi-square of 3 degrees of freedom, 99.99 %
+constexpr double kTorn = 5;               // chi-square of odometry, per degree of freedom
 constexpr int kMaxRestarts = 2;
 constexpr int kFewBoxes = 3;
 
@@ -23,6 +25,18 @@ bool KeepIfBetter(const State& attempt, const Summary& total, State* state, Summ
   *summary = total;
   *state = attempt;
   return true;
+}
+
+// Whether the prior excludes an object's size: boxes fit a sliver at another depth as well.
+bool HasImpossibleSize(const PreparedGraph& prepared,
+                       const SolveOptions& options,
+                       const State& state,
+                       int object) {
+  if (options.landmark_model != LandmarkModel::kEllipsoid) return false;
+  const SizePriorTable& prior = prepared.graph.size_prior;
+  const Eigen::Array3d semi_axes = AxesFromEllipsoid(state.landmarks.row(object)).semi_axes;
+  const Eigen::Array3d error = semi_axes.log() - prior.log_mean[object];
+  return error.square().sum() > kImpossibleSize * std::pow(prior.log_sigma[object], 2);
 }
 
 }  // namespace
@@ -117,7 +131,8 @@ void TryOtherDepths(const PreparedGraph& prepared,
   by_size.start = Start::kSizePrior;
   for (int object = 0; object < prepared.graph.num_objects(); ++object) {
     const std::vector<int>& boxes = prepared.boxes_of_object[object];
-    if (static_cast<int>(boxes.size()) > kFewBoxes) continue;
+    const bool is_few = static_cast<int>(boxes.size()) <= kFewBoxes;
+    if (!is_few && !HasImpossibleSize(prepared, options, *state, object)) continue;
     State attempt = *state;
     attempt.landmarks.row(object) = StartObject(prepared, by_size, attempt, object, boxes);
     Summary total = *summary;

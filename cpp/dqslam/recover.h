@@ -17,8 +17,9 @@ std::vector<bool> StuckObjects(const PreparedGraph& prepared,
 /// there as well, of a place that is turned by a whole turn more than odometry says.
 bool IsTorn(const PreparedGraph& prepared, const State& state);
 
-/// Objects of few boxes have several minima, in depth above all: starts each of them at the depth
-/// of the prior size as well, minimises all, and keeps what lowers the cost.
+/// Objects of few boxes have several minima, in depth above all: starts each of them, and those
+/// whose size the prior excludes, at the depth of the prior size as well, minimises all, and keeps
+/// what lowers the cost.
 void TryOtherDepths(const PreparedGraph& prepared,
                     const SolveOptions& options,
                     const Monitor& monitor,
