@@ -12,6 +12,9 @@ from dqslam.recording import Detections
 
 # 99 % of the boxes of an object that is where the map says lie below this, by edges that count.
 CHI2_GATE = np.array([0.0, 6.63, 9.21, 11.34, 13.28])
+# The gate of an association holds 99.9 %: a step of odometry that errs by two sigmas moves all boxes
+# of an image at once, and a map that none of them is taken for is made again beside itself.
+GATE = np.array([0.0, 10.83, 13.82, 16.27, 18.47])
 # A detector confuses classes, so no class is impossible.
 CONFUSED = 0.02
 _STEP = 1e-4
@@ -144,7 +147,7 @@ def pair_costs(
     d2 = np.sum(error * np.linalg.solve(spread, error[..., None])[..., 0], axis=-1)
     log_det = np.linalg.slogdet(2 * np.pi * spread)[1]
     edges = 4 - truncated.sum(axis=1)
-    inside = (d2 <= CHI2_GATE[edges][:, None]) & (edges > 0)[:, None]
+    inside = (d2 <= GATE[edges][:, None]) & (edges > 0)[:, None]
     cost = np.where(inside, d2 + log_det - 2 * np.log(class_probability), np.inf)
     volume = (camera.width * camera.height) ** 2 / 4.0
     return PairCosts(cost=cost, null=2 * np.log(volume) * edges / 4.0)
