@@ -8,7 +8,7 @@ from scipy.stats import chi2
 from dqslam import Detections, PoseModel, _core
 from dqslam.associate import CHI2_GATE, box_chi2
 from dqslam.associate.assignment import assign
-from dqslam.associate.gating import PredictedBoxes, pair_costs, predict_boxes
+from dqslam.associate.gating import GATE, PredictedBoxes, pair_costs, predict_boxes
 from scenes import CAMERA, outline
 
 POSE = np.array([0.2, -0.1, 0.3, 0.0, 0.0, np.sin(0.1), np.cos(0.1)])
@@ -65,9 +65,9 @@ def test_distances_of_simulated_boxes_follow_chi_square():
     log_det = np.linalg.slogdet(2 * np.pi * spread)[1]
     distance = costs(predicted, box).cost[:, 0] - log_det
     inside = np.isfinite(distance)
-    assert inside.mean() == pytest.approx(0.99, abs=0.006)
+    assert inside.mean() == pytest.approx(0.999, abs=0.003)
     # The mean below the gate, of 4 degrees of freedom: x f4(x) is 4 f6(x).
-    expected = 4.0 * chi2.cdf(CHI2_GATE[4], 6) / chi2.cdf(CHI2_GATE[4], 4)
+    expected = 4.0 * chi2.cdf(GATE[4], 6) / chi2.cdf(GATE[4], 4)
     assert distance[inside].mean() == pytest.approx(expected, abs=0.15)
     # Neither the pose alone nor the detector alone would do.
     alone = np.einsum(
@@ -78,6 +78,7 @@ def test_distances_of_simulated_boxes_follow_chi_square():
 
 def test_gates_are_those_of_chi_square():
     np.testing.assert_allclose(CHI2_GATE[1:], chi2.ppf(0.99, [1, 2, 3, 4]), atol=0.01)
+    np.testing.assert_allclose(GATE[1:], chi2.ppf(0.999, [1, 2, 3, 4]), atol=0.01)
 
 
 def test_a_cost_by_hand():
