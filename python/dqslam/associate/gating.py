@@ -12,8 +12,8 @@ from dqslam.recording import Detections
 
 # 99 % of the boxes of an object that is where the map says lie below this, by edges that count.
 CHI2_GATE = np.array([0.0, 6.63, 9.21, 11.34, 13.28])
-# The gate of an association holds 99.9 %: a step of odometry that errs by two sigmas moves all boxes
-# of an image at once, and a map that none of them is taken for is made again beside itself.
+# The gate of an association holds 99.9 %: a step of odometry that errs by two sigmas moves all
+# boxes of an image at once, and a map that none of them is taken for is made again beside itself.
 GATE = np.array([0.0, 10.83, 13.82, 16.27, 18.47])
 # A detector confuses classes, so no class is impossible.
 CONFUSED = 0.02

@@ -127,7 +127,6 @@ def run(
     assigned = shown.select(object_id >= 0)
     chi2 = box_chi2(estimate, assigned, noise)
     estimate = replace(estimate, inliers=chi2 <= CHI2_GATE[4])
-    mapped = np.isin(assigned.object_id, estimate.object_ids)
     tested = detections.select(held_out if hold_out else ~held_out)
     if trust_ids < 1.0:
         tested = replace(tested, object_id=np.full(len(tested), -1))
@@ -137,20 +136,11 @@ def run(
         shown = replace(detections, object_id=object_id)
     report = {
         "mode": mode.name.lower(),
-        "poses": len(estimate.timestamps),
-        "keyframes": len(found.keyframes),
-        "boxes": describe_boxes(chi2[mapped])
-        | {
-            "of_dropped_objects": int(np.sum(~mapped)),
-            "unassigned": int(np.sum(found.object_id < 0)),
-        },
-        "objects": describe_objects(estimate, assigned, chi2),
+        **_describe(found, estimate, assigned, chi2),
         "reprojection": describe_overlap(overlap) | {"held_out": hold_out > 0.0},
         "box_noise": {"pixels": noise.pixels, "relative": noise.relative},
         "odometry_noise": _describe_noise(found, estimates_noise),
-        "dropped_objects": {str(name): why for name, why in estimate.dropped.items()},
         "under_constrained": [] if marginals is None else list(marginals.under_constrained),
-        "size_prior": describe_size_prior(found.scene.size_prior),
         "trajectory_error": None if reference is None else trajectory_error(estimate, reference),
         "solver": None if summary is None else describe_solver(summary),
     }
@@ -221,6 +211,25 @@ def _nothing(recording: Recording, path: NDArray[np.float64], dropped: dict[int,
         ellipsoids=np.zeros((0, 9)),
         dropped=dict(sorted(dropped.items())),
     )
+
+
+def _describe(
+    found: Association, estimate: Estimate, assigned: Detections, chi2: NDArray[np.float64]
+) -> dict[str, Any]:
+    """Describe the map, and how the boxes that were given to objects fit it: chi-squares (m,)."""
+    mapped = np.isin(assigned.object_id, estimate.object_ids)
+    return {
+        "poses": len(estimate.timestamps),
+        "keyframes": len(found.keyframes),
+        "boxes": describe_boxes(chi2[mapped])
+        | {
+            "of_dropped_objects": int(np.sum(~mapped)),
+            "unassigned": int(np.sum(found.object_id < 0)),
+        },
+        "objects": describe_objects(estimate, assigned, chi2),
+        "dropped_objects": {str(name): why for name, why in estimate.dropped.items()},
+        "size_prior": describe_size_prior(found.scene.size_prior),
+    }
 
 
 def _describe_noise(found: Association, is_estimated: bool) -> dict[str, Any]:
