@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from dqslam.cli.options import FrameRate, FrameTimesFile
+
 
 def convert(
     source: Annotated[Path, typer.Argument(metavar="IN", help="A file, a folder of YOLO, a bag.")],
@@ -19,12 +21,8 @@ def convert(
     camera: Annotated[
         Path | None, typer.Option(help="Its image size is what YOLO's boxes are shares of.")
     ] = None,
-    frame_times: Annotated[
-        Path | None, typer.Option(help="Times of frames: KITTI times.txt, TUM rgb.txt, frames.csv.")
-    ] = None,
-    frame_rate: Annotated[
-        float | None, typer.Option(metavar="HZ", help="Or frames a second, frame 0 at 0 s.")
-    ] = None,
+    frame_times: FrameTimesFile = None,
+    frame_rate: FrameRate = None,
     classes: Annotated[
         Path | None,
         typer.Option(help="Names of classes: COCO JSON, data.yaml, or a text of one a line."),

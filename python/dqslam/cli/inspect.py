@@ -1,10 +1,19 @@
 """``dqslam inspect``: what is in a recording, and which of the usual mistakes."""
 
 import json
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
+
+from dqslam.cli.options import (
+    CameraFile,
+    DetectionFile,
+    Formats,
+    FrameRate,
+    FrameTimesFile,
+    MaxTimeDifference,
+    OdometryFile,
+)
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -15,27 +24,17 @@ MOST_LISTED = 8
 
 
 def inspect(
-    camera: Annotated[Path, typer.Option(help="Camera: JSON, TOML, ROS, COLMAP, KITTI, bag.")],
-    odometry: Annotated[Path, typer.Option(help="Trajectory: TUM, KITTI, EuRoC, bag.")],
-    detections: Annotated[Path, typer.Option(help="Boxes: CSV, COCO, YOLO, MOT, bag.")],
-    formats: Annotated[
-        list[str] | None,
-        typer.Option("--format", metavar="NAME", help="Of a file, where its look does not tell."),
-    ] = None,
-    frame_times: Annotated[
-        Path | None, typer.Option(help="Times of frames: KITTI times.txt, TUM rgb.txt, frames.csv.")
-    ] = None,
-    frame_rate: Annotated[
-        float | None, typer.Option(metavar="HZ", help="Or frames a second, frame 0 at 0 s.")
-    ] = None,
+    camera: CameraFile,
+    odometry: OdometryFile,
+    detections: DetectionFile,
+    formats: Formats = None,
+    frame_times: FrameTimesFile = None,
+    frame_rate: FrameRate = None,
     ids: Annotated[
         Literal["track_id", "class_id"] | None,
         typer.Option(help="The column that tells objects apart. Default: boxes that overlap."),
     ] = None,
-    max_time_difference: Annotated[
-        float | None,
-        typer.Option(help="Seconds from a box to its pose. Default: half the interval of poses."),
-    ] = None,
+    max_time_difference: MaxTimeDifference = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
     strict: Annotated[bool, typer.Option("--strict", help="Exit with 1 if there are warnings.")] = (
         False

@@ -6,6 +6,15 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from dqslam.cli.options import (
+    CameraFile,
+    DetectionFile,
+    Formats,
+    FrameRate,
+    FrameTimesFile,
+    MaxTimeDifference,
+    OdometryFile,
+)
 from dqslam.cli.progress import show_share
 
 if TYPE_CHECKING:
@@ -19,21 +28,14 @@ UNSURE = 0.9
 
 
 def run(
-    camera: Annotated[Path, typer.Option(help="Camera: JSON, TOML, ROS, COLMAP, KITTI, bag.")],
-    odometry: Annotated[Path, typer.Option(help="Trajectory: TUM, KITTI, EuRoC, bag.")],
-    detections: Annotated[Path, typer.Option(help="Boxes: CSV, COCO, YOLO, MOT, bag.")],
+    camera: CameraFile,
+    odometry: OdometryFile,
+    detections: DetectionFile,
     out: Annotated[Path, typer.Option(help="Directory of the results.")],
     min_score: Annotated[float, typer.Option(help="Leave out boxes with a lower score.")] = 0.5,
-    formats: Annotated[
-        list[str] | None,
-        typer.Option("--format", metavar="NAME", help="Of a file, where its look does not tell."),
-    ] = None,
-    frame_times: Annotated[
-        Path | None, typer.Option(help="Times of frames: KITTI times.txt, TUM rgb.txt, frames.csv.")
-    ] = None,
-    frame_rate: Annotated[
-        float | None, typer.Option(metavar="HZ", help="Or frames a second, frame 0 at 0 s.")
-    ] = None,
+    formats: Formats = None,
+    frame_times: FrameTimesFile = None,
+    frame_rate: FrameRate = None,
     ids: Annotated[
         Literal["none", "track_id", "class_id"],
         typer.Option(
@@ -79,10 +81,7 @@ def run(
         float,
         typer.Option(min=0.0, max=0.99, help="Share of boxes that the map is tested on instead."),
     ] = 0.0,
-    max_time_difference: Annotated[
-        float | None,
-        typer.Option(help="Seconds from a box to its pose. Default: half the interval of poses."),
-    ] = None,
+    max_time_difference: MaxTimeDifference = None,
 ) -> None:
     """Estimate the trajectory and the objects of a recording.
 

@@ -1,0 +1,24 @@
+"""Options that several commands share: the files of a recording, and when its frames were taken."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+CameraFile = Annotated[Path, typer.Option(help="Camera: JSON, TOML, ROS, COLMAP, KITTI, bag.")]
+OdometryFile = Annotated[Path, typer.Option(help="Trajectory: TUM, KITTI, EuRoC, bag.")]
+DetectionFile = Annotated[Path, typer.Option(help="Boxes: CSV, COCO, YOLO, MOT, bag.")]
+Formats = Annotated[
+    list[str] | None,
+    typer.Option("--format", metavar="NAME", help="Of a file, where its look does not tell."),
+]
+FrameTimesFile = Annotated[
+    Path | None, typer.Option(help="Times of frames: KITTI times.txt, TUM rgb.txt, frames.csv.")
+]
+FrameRate = Annotated[
+    float | None, typer.Option(metavar="HZ", help="Or frames a second, frame 0 at 0 s.")
+]
+MaxTimeDifference = Annotated[
+    float | None,
+    typer.Option(help="Seconds from a box to its pose. Default: half the interval of poses."),
+]
