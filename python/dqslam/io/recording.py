@@ -248,9 +248,10 @@ def _nothing_left(
     table: DetectionTable, dropped: Dropped, ids: Ids, tolerance: float, times: NDArray[np.float64]
 ) -> str:
     """Say why none of the boxes can be used."""
+    unnamed = "" if ids == "none" else f"{dropped.without_id} without {ids}, "
     return (
         f"no object is left of {len(table.line)} boxes: {dropped.below_min_score} below the least "
-        f"score, {dropped.without_id} without {ids}, {dropped.without_pose} further than "
+        f"score, {unnamed}{dropped.without_pose} further than "
         f"{tolerance:g} s from a pose (boxes {table.timestamp.min():.6f} to "
         f"{table.timestamp.max():.6f} s, poses {times[0]:.6f} to {times[-1]:.6f} s), "
         f"{dropped.repeated} repeated, {sum(dropped.few_boxes.values())} of objects with fewer "
