@@ -2,7 +2,9 @@
 
 #include <ceres/problem.h>
 #include <ceres/solver.h>
+#ifdef _OPENMP
 #include <omp.h>
+#endif
 
 #include <algorithm>
 #include <cmath>
@@ -14,14 +16,17 @@
 namespace dqslam {
 namespace {
 
-// Debian's CHOLMOD opens OpenMP threads of its own, which cost more than they give at this size.
+// Debian's CHOLMOD opens OpenMP threads of its own, which cost more than they give at this size.  A
+// Ceres without SuiteSparse factorises with Eigen, in one thread: the core is built without OpenMP.
 class SingleOpenMpThread {
+#ifdef _OPENMP
  public:
   SingleOpenMpThread() : levels_(omp_get_max_active_levels()) { omp_set_max_active_levels(0); }
   ~SingleOpenMpThread() { omp_set_max_active_levels(levels_); }
 
  private:
   int levels_;
+#endif
 };
 
 class MonitorCallback : public ceres::IterationCallback {
@@ -127,7 +132,7 @@ Summary Optimize(const PreparedGraph& prepared,
                  const Stage& stage,
                  const Monitor& monitor,
                  State* state) {
-  const SingleOpenMpThread single_thread;
+  [[maybe_unused]] const SingleOpenMpThread single_thread{};
   ceres::Problem problem;
   Assemble(prepared, options, stage, state, &problem);
   const bool polishes = stage.minimizer == Minimizer::kDogleg && stage.residual == Residual::kBox;
