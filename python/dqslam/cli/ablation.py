@@ -46,7 +46,7 @@ def ablation(
     if find_spec("matplotlib") is None:
         console.print("no ablation.png: matplotlib is missing (pip install 'dqslam[plot]')")
         return
-    from dqslam.plot_ablation import plot_ablation
+    from dqslam.plot.ablation import plot_ablation
 
     plot_ablation(table, out / "ablation.png")
     console.print(f"wrote {out / 'ablation.png'}", markup=False)

@@ -37,7 +37,7 @@ def degeneracy(
     if find_spec("matplotlib") is None:
         console.print("no degeneracy.png: matplotlib is missing (pip install 'dqslam[plot]')")
         return
-    from dqslam.plot_degeneracy import plot_degeneracy
+    from dqslam.plot.degeneracy import plot_degeneracy
 
     plot_degeneracy(table, out / "degeneracy.png")
     console.print(f"wrote {out / 'degeneracy.png'}", markup=False)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dqslam import build_graph, load_scenario, plot_maps, simulate, solve
-from dqslam.plot import _outline, _true_outlines, _window
+from dqslam.plot.maps import _outline, _true_outlines, _window
 
 
 def area(outline):
