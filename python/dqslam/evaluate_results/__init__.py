@@ -1,5 +1,6 @@
 """Results from files against the truth from files: all that ``dqslam evaluate`` reports."""
 
+from dqslam.evaluate_results.boxes import box_overlaps as box_overlaps
 from dqslam.evaluate_results.boxes import judge_association as judge_association
 from dqslam.evaluate_results.boxes import judge_reprojection as judge_reprojection
 from dqslam.evaluate_results.evaluation import evaluate_results as evaluate_results

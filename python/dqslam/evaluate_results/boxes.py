@@ -9,7 +9,7 @@ import numpy as np
 
 from dqslam._checks import Bools, Floats
 from dqslam.evaluate import match_boxes, reprojection_iou, score_association
-from dqslam.io import Results, TrueBoxes, nearest_pose
+from dqslam.io import BoxTable, Results, TrueBoxes, nearest_pose
 
 
 def judge_reprojection(results: Results) -> dict[str, Any] | None:
@@ -17,9 +17,22 @@ def judge_reprojection(results: Results) -> dict[str, Any] | None:
 
     All that were used, those of them that fit, and those that were held out; None without boxes.
     """
-    boxes, objects = results.boxes, results.objects
+    boxes = results.boxes
     if boxes is None:
         return None
+    overlap = box_overlaps(results, boxes)
+    mapped = np.isfinite(overlap)
+    used = mapped & ~boxes.held_out
+    return {
+        **_describe(overlap, used),
+        "inliers": _describe(overlap, used & boxes.inlier),
+        "held_out": _describe(overlap, mapped & boxes.held_out),
+    }
+
+
+def box_overlaps(results: Results, boxes: BoxTable) -> Floats:
+    """Return the IoU of each box with its projected object, (m,); NaN where that is not mapped."""
+    objects = results.objects
     row_of = {int(number): row for row, number in enumerate(objects.id)}
     row = np.array([row_of.get(int(number), -1) for number in boxes.object_id], dtype=np.int64)
     mapped = row >= 0
@@ -31,12 +44,7 @@ def judge_reprojection(results: Results) -> dict[str, Any] | None:
         boxes.box[mapped],
         boxes.truncated[mapped],
     )
-    used = mapped & ~boxes.held_out
-    return {
-        **_describe(overlap, used),
-        "inliers": _describe(overlap, used & boxes.inlier),
-        "held_out": _describe(overlap, mapped & boxes.held_out),
-    }
+    return overlap
 
 
 def _describe(overlap: Floats, chosen: Bools) -> dict[str, Any]:
