@@ -1,7 +1,10 @@
-"""The command line: a module per command, put together here; the only part that prints."""
+"""The command line: a module per command, put together here; the only part that prints.
+
+A command's module imports nothing heavy but inside its functions: `dqslam --help` must not wait.
+"""
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import typer
@@ -14,20 +17,30 @@ from dqslam.cli.inspect import inspect
 from dqslam.cli.paper import paper
 from dqslam.cli.run import run
 
+# The table of contents: commands in the order of the help, by the title of their panel.
+COMMANDS: dict[str, tuple[Callable[..., None], ...]] = {
+    "Start here": (paper,),
+    "Your recording": (inspect, convert, run, evaluate),
+    "Study": (ablation, degeneracy),
+}
+EXIT_CODES = {
+    0: "done",
+    1: "a mistake in dqslam itself; its traceback is shown",
+    2: "bad input: options, files, or a problem that they do not determine",
+    3: "done, and `inspect --strict` has found what looks like a mistake",
+    130: "stopped by Ctrl-C",
+}
+
 app = typer.Typer(
     name="dqslam",
     help="Object SLAM with dual quadrics.",
-    add_completion=False,
+    epilog="Exit codes: " + "; ".join(f"{code} {why}" for code, why in EXIT_CODES.items()) + ".",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
 )
-app.command()(paper)
-app.command()(run)
-app.command()(evaluate)
-app.command()(inspect)
-app.command()(convert)
-app.command()(degeneracy)
-app.command()(ablation)
+for _panel, _commands in COMMANDS.items():
+    for _command in _commands:
+        app.command(rich_help_panel=_panel)(_command)
 
 _INTERRUPTED = 130
 _BAD_INPUT = 2
@@ -36,7 +49,7 @@ _UsageError: Any = typer.BadParameter.__mro__[1]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command and return the exit code: 0 done, 2 bad input, 130 stopped by Ctrl-C.
+    """Run a command and return its exit code, one of `EXIT_CODES`.
 
     Bad input is one line on stderr; an error that is ours keeps its traceback.
     """

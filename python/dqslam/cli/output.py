@@ -1,0 +1,105 @@
+"""What a command says: tables and lines for people, one JSON document for machines, or nothing.
+
+All of it goes to stdout; what is shown while one waits goes to stderr, where that is a terminal.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+Quiet = Annotated[
+    bool, typer.Option("--quiet", "-q", help="Say nothing but errors.", rich_help_panel="Output")
+]
+Json = Annotated[
+    bool,
+    typer.Option(
+        "--json", help="Print one JSON document instead of tables.", rich_help_panel="Output"
+    ),
+]
+
+
+class Output:
+    """The one way of a command to say something.
+
+    Parameters
+    ----------
+    quiet
+        Whether nothing is said, and no progress shown.
+    as_json
+        Whether only `document` prints.
+    """
+
+    def __init__(self, *, quiet: bool = False, as_json: bool = False) -> None:
+        self._speaks = not quiet and not as_json
+        self._shows_progress = not quiet
+        self._as_json = as_json
+
+    def table(self, table: RenderableType) -> None:
+        """Print a table."""
+        if self._speaks:
+            from rich.console import Console
+
+            Console().print(table)
+
+    def line(self, text: str, *, style: str | None = None) -> None:
+        """Print a line as it is, never broken."""
+        if self._speaks:
+            from rich.console import Console
+
+            Console().print(text, style=style, markup=False, highlight=False, soft_wrap=True)
+
+    def document(self, content: dict[str, Any]) -> None:
+        """Print the JSON document, if one is asked for; NaN and infinity become null."""
+        if self._as_json:
+            from dqslam.io.files import jsonable
+
+            text = json.dumps(jsonable(content), indent=2, allow_nan=False, ensure_ascii=False)
+            typer.echo(text)
+
+    @contextmanager
+    def count(self, things: str, total: int) -> Iterator[Callable[[int, int], None]]:
+        """Show a bar of the things that are done, of `total`, with the time left.
+
+        Gives a function of (done, total).
+        """
+        from rich.progress import BarColumn, MofNCompleteColumn, TimeRemainingColumn
+
+        columns = (things, BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), "left")
+        with self._bar(columns, total) as update:
+            yield lambda done, _: update(done)
+
+    @contextmanager
+    def share(self, what: str) -> Iterator[Callable[[float], None]]:
+        """Show a bar of the share, 0 to 1, that is done, with the time left."""
+        from rich.progress import BarColumn, TaskProgressColumn, TimeRemainingColumn
+
+        columns = (what, BarColumn(), TaskProgressColumn(), TimeRemainingColumn(), "left")
+        with self._bar(columns, 1.0) as update:
+            yield update
+
+    @contextmanager
+    def waiting(self, what: str) -> Iterator[None]:
+        """Show that something goes on of which nobody knows how long it takes, and since when."""
+        from rich.progress import SpinnerColumn, TimeElapsedColumn
+
+        with self._bar((SpinnerColumn(), what, TimeElapsedColumn()), None):
+            yield
+
+    @contextmanager
+    def _bar(self, columns: tuple[Any, ...], total: float | None) -> Iterator[Callable[..., None]]:
+        from rich.console import Console
+        from rich.progress import Progress
+
+        console = Console(stderr=True)
+        shown = self._shows_progress and console.is_terminal
+        with Progress(*columns, console=console, disable=not shown, transient=True) as bar:
+            task = bar.add_task("", total=total)
+            yield lambda done: bar.update(task, completed=done)
