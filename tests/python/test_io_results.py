@@ -264,3 +264,67 @@ def test_what_is_wrong_is_named(tmp_path, name, old, new, message):
     (tmp_path / name).write_text(text.replace(old, new, 1))
     with pytest.raises(FileError, match=message):
         load_results(tmp_path)
+
+
+def spd(seed, size):
+    factor = np.random.default_rng(seed).normal(size=(size, size))
+    return 1e-6 * factor @ factor.T
+
+
+def test_covariances_of_poses_come_back(tmp_path):
+    poses = np.array([spd(1, 6), np.full((6, 6), np.nan)])
+    save_estimate(estimate(), tmp_path, marginals=Marginals(poses, np.zeros((2, 9, 9)), ()))
+    found = load_results(tmp_path).covariance
+    np.testing.assert_allclose(found[0], poses[0], rtol=1e-8, atol=1e-20)
+    assert np.isnan(found[1]).all()
+    save_estimate(estimate(), tmp_path)
+    assert not (tmp_path / "covariance.csv").exists()
+    assert np.isnan(load_results(tmp_path).covariance).all()
+
+
+MOUNT = np.array([0.2, -0.1, 0.3, -0.5, 0.5, -0.5, 0.5])
+
+
+@pytest.mark.parametrize("model", [_core.PoseModel.SE2, _core.PoseModel.SE3])
+def test_covariance_of_the_camera_is_that_of_small_motions_of_the_robot(tmp_path, model):
+    size = 3 if model == _core.PoseModel.SE2 else 6
+    pose = np.array([[1.0, 2.0, 0.7]] if size == 3 else [[1.0, 2, 3, 0.5, 0.5, 0.5, 0.5]])
+    poses = np.repeat(pose, 2, axis=0)
+    camera = _core.Camera(500, 500, 320, 240, 640, 480, robot_from_camera=MOUNT)
+    robot = estimate(pose_model=model, camera=camera, poses=poses, initial_poses=poses)
+    covariance = spd(2, size)
+    marginals = Marginals(np.array([covariance] * 2), np.zeros((2, 9, 9)), ())
+    save_estimate(robot, tmp_path, marginals=marginals)
+
+    def seen(robots):
+        return _core.world_from_camera(model, camera, robots)
+
+    tangents = 1e-5 * np.eye(size)
+    moved = seen(_core.plus(model, np.repeat(pose, size, axis=0), tangents))
+    still = seen(np.repeat(pose, size, axis=0))
+    jacobian = _core.minus(_core.PoseModel.SE3, moved, still).T / 1e-5
+    expected = jacobian @ covariance @ jacobian.T
+    found = load_results(tmp_path).covariance[1]
+    np.testing.assert_allclose(found, expected, rtol=1e-4, atol=1e-4 * expected.max())
+
+
+def test_covariances_of_other_poses_are_refused(tmp_path):
+    marginals = Marginals(np.zeros((3, 6, 6)), np.zeros((2, 9, 9)), ())
+    with pytest.raises(ValueError, match=r"marginals.poses: expected shape \(2, 6, 6\)"):
+        save_estimate(estimate(), tmp_path, marginals=marginals)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("0.25,", "0.5,", r"covariance.csv:2: timestamp 0.5 is of no pose"),
+        ("0.25,0", "0.25,-1", r"covariance.csv:2: a variance is negative"),
+        ("0.25,0", "0.25,x", r"covariance.csv:2: c11 is 'x', not a number"),
+    ],
+)
+def test_a_bad_line_of_covariances_is_named(tmp_path, old, new, message):
+    save_all(tmp_path)
+    path = tmp_path / "covariance.csv"
+    path.write_text(path.read_text().replace(old, new, 1))
+    with pytest.raises(FileError, match=message):
+        load_results(tmp_path)

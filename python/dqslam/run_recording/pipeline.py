@@ -40,7 +40,8 @@ class RunResult:
     held_out: NDArray[np.bool_]
     """Which boxes were kept from the estimator, shape (m,)."""
     marginals: Marginals | None
-    """Covariances of keyframes and mapped objects; None without objects."""
+    """Covariances of the poses, NaN between keyframes, and of the mapped objects; None without
+    objects."""
     summary: _core.Summary | None
     """How the solver got there; None without objects."""
     report: dict[str, Any]
@@ -181,8 +182,11 @@ def _finish(
         ellipsoids=solved.ellipsoids[order],
         dropped=dict(sorted(dropped.items())),
     )
+    poses = np.full((len(path), *marginals.poses.shape[1:]), np.nan)
+    poses[found.keyframes] = marginals.poses
     marginals = replace(
         marginals,
+        poses=poses,
         objects=marginals.objects[order],
         under_constrained=tuple(_named(text, found) for text in marginals.under_constrained),
     )

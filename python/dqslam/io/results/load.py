@@ -15,6 +15,7 @@ from dqslam._checks import Bools, Floats, Ints, as_floats, as_ints
 from dqslam.io.camera import read_camera
 from dqslam.io.files import FileError, read_text
 from dqslam.io.results.boxes import BoxTable, read_boxes
+from dqslam.io.results.covariances import read_covariances
 from dqslam.io.trajectory import read_trajectory
 
 
@@ -73,6 +74,9 @@ class Results:
     """Estimated, shape (n, 7)."""
     odometry: Floats
     """world_from_camera that the estimate started from, shape (n, 7)."""
+    covariance: Floats
+    """Of the poses in the frame of the camera, x y z [m] and rotation vector [rad], the first pose
+    being exact; shape (n, 6, 6), NaN where unknown."""
     objects: MapObjects
     boxes: BoxTable | None
     """None without ``boxes.csv``."""
@@ -83,7 +87,7 @@ class Results:
 def load_results(directory: str | Path) -> Results:
     """Read a directory of results; FileError names what is missing or wrong, and its line.
 
-    ``boxes.csv`` and ``report.json`` may be absent.
+    ``covariance.csv``, ``boxes.csv`` and ``report.json`` may be absent.
     """
     directory = Path(directory)
     if not directory.is_dir():
@@ -93,6 +97,7 @@ def load_results(directory: str | Path) -> Results:
     if not np.array_equal(times, odometry_times):
         message = f"its times are not those of {directory / 'trajectory.txt'}"
         raise FileError(directory / "odometry.txt", message)
+    covariance = directory / "covariance.csv"
     boxes, report = directory / "boxes.csv", directory / "report.json"
     return Results(
         directory=directory,
@@ -100,6 +105,9 @@ def load_results(directory: str | Path) -> Results:
         timestamps=times,
         world_from_camera=poses,
         odometry=odometry,
+        covariance=read_covariances(covariance, times)
+        if covariance.exists()
+        else np.full((len(times), 6, 6), np.nan),
         objects=_read_map(directory / "map.json"),
         boxes=read_boxes(boxes, times) if boxes.exists() else None,
         report=_read_json(report) if report.exists() else {},

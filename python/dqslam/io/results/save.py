@@ -12,12 +12,17 @@ from dqslam._checks import Bools, Floats
 from dqslam.estimate import Estimate
 from dqslam.io.files import write_json
 from dqslam.io.results.boxes import write_boxes
+from dqslam.io.results.covariances import write_covariances
 from dqslam.io.trajectory import write_trajectory
 from dqslam.recording import Detections
 
 
-class ObjectCovariances(Protocol):
-    """What ``uncertainty.Marginals`` has of the mapped objects."""
+class Covariances(Protocol):
+    """What ``uncertainty.Marginals`` has of the poses and the mapped objects."""
+
+    @property
+    def poses(self) -> Floats:
+        """Covariance of each pose in its own frame [m, rad], shape (n, k, k); NaN for none."""
 
     @property
     def objects(self) -> Floats:
@@ -30,7 +35,7 @@ def save_estimate(
     *,
     detections: Detections | None = None,
     held_out: Bools | None = None,
-    marginals: ObjectCovariances | None = None,
+    marginals: Covariances | None = None,
 ) -> None:
     """Write an estimate into a directory, which is made if need be.
 
@@ -46,7 +51,8 @@ def save_estimate(
     held_out
         Which of them were kept from the estimator, shape (m,); none by default.
     marginals
-        Covariances of the mapped objects, for the ellipsoid model.
+        Covariances of the mapped objects, for the ellipsoid model, and of the poses, for
+        ``covariance.csv``.
     """
     directory = Path(directory)
     paths = {"trajectory.txt": estimate.poses, "odometry.txt": estimate.initial_poses}
@@ -61,6 +67,10 @@ def save_estimate(
         write_boxes(directory / "boxes.csv", estimate, detections, held_out)
     else:
         (directory / "boxes.csv").unlink(missing_ok=True)  # those of an estimate before this one
+    if marginals is not None:
+        write_covariances(directory / "covariance.csv", estimate, marginals.poses)
+    else:
+        (directory / "covariance.csv").unlink(missing_ok=True)
 
 
 def _camera(camera: _core.Camera) -> dict[str, Any]:
@@ -69,7 +79,7 @@ def _camera(camera: _core.Camera) -> dict[str, Any]:
     return {name: getattr(camera, name) for name in names} | dict(lens)
 
 
-def _object(estimate: Estimate, row: int, marginals: ObjectCovariances | None) -> dict[str, Any]:
+def _object(estimate: Estimate, row: int, marginals: Covariances | None) -> dict[str, Any]:
     """Describe one object; a dual quadric that is no ellipsoid has a centre, but null axes."""
     semi_axes, orientation = None, None
     if estimate.is_ellipsoid[row]:

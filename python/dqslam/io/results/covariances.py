@@ -1,0 +1,76 @@
+"""Covariances of an estimate's poses as CSV, a row for each pose whose covariance is known.
+
+``timestamp``
+    Seconds, that of a pose of ``trajectory.txt``.
+``c11 c12 .. c16 c22 .. c66``
+    The upper triangle of the covariance of the camera's pose in the frame of the camera: x y z of
+    its position [m], then of its rotation vector [rad]. The first pose is the gauge: it is exact,
+    and the others are relative to it.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from dqslam import _core
+from dqslam._checks import Floats
+from dqslam.estimate import Estimate
+from dqslam.io.csv_table import read_csv
+from dqslam.io.files import write_text
+
+_ROWS, _COLUMNS = np.triu_indices(6)
+ENTRIES = tuple(f"c{row + 1}{column + 1}" for row, column in zip(_ROWS, _COLUMNS, strict=True))
+
+
+def write_covariances(path: str | Path, estimate: Estimate, covariances: Floats) -> None:
+    """Write those of the poses of a robot, shape (n, k, k), as they are for its camera; NaN: none.
+
+    ``covariances`` is in the frames of the robot's poses, as ``uncertainty.Marginals`` has it.
+    """
+    size = 3 if estimate.pose_model == _core.PoseModel.SE2 else 6
+    count = len(estimate.timestamps)
+    if covariances.shape != (count, size, size):
+        raise ValueError(
+            f"marginals.poses: expected shape {(count, size, size)}, got {covariances.shape}"
+        )
+    camera_from_robot = _camera_from_robot(estimate.pose_model, estimate.camera)
+    moved = camera_from_robot @ covariances @ camera_from_robot.T
+    known = np.flatnonzero(np.isfinite(moved).all(axis=(1, 2)))
+    lines = [",".join(("timestamp", *ENTRIES)) + "\n"]
+    for row in known:
+        entries = (f"{entry:.9g}" for entry in moved[row][_ROWS, _COLUMNS])
+        lines.append(",".join((repr(float(estimate.timestamps[row])), *entries)) + "\n")
+    write_text(path, lines)
+
+
+def read_covariances(path: str | Path, timestamps: Floats) -> Floats:
+    """Read those of the poses at these times (n,), shape (n, 6, 6); NaN where there is none."""
+    table = read_csv(path, required=("timestamp", *ENTRIES), allow_empty=True)
+    time = table.numbers("timestamp")
+    pose = np.searchsorted(timestamps, time).clip(max=len(timestamps) - 1)
+    table.reject(timestamps[pose] != time, "timestamp {} is of no pose", "timestamp")
+    upper = np.zeros((len(table), 6, 6))
+    upper[:, _ROWS, _COLUMNS] = np.column_stack([table.numbers(name) for name in ENTRIES])
+    full = np.triu(upper) + np.triu(upper, 1).transpose(0, 2, 1)
+    negative = np.any(np.diagonal(full, axis1=1, axis2=2) < 0.0, axis=1)
+    table.reject(negative, "a variance is negative")
+    covariances = np.full((len(timestamps), 6, 6), np.nan)
+    covariances[pose] = full
+    return covariances
+
+
+def _camera_from_robot(model: _core.PoseModel, camera: _core.Camera) -> Floats:
+    """Return what turns a small motion of the robot into one of its camera, shape (6, k).
+
+    A camera at t, turned by R, on a robot that moves by v and turns by w, all in its frame, moves
+    by R^T (v + w x t) and turns by R^T w.
+    """
+    from scipy.spatial.transform import Rotation
+
+    turn = Rotation.from_quat(camera.robot_from_camera[3:]).as_matrix().T
+    x, y, z = camera.robot_from_camera[:3]
+    cross = np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])  # w -> w x t
+    full = np.block([[turn, turn @ cross], [np.zeros((3, 3)), turn]])
+    return full[:, [0, 1, 5]] if model == _core.PoseModel.SE2 else full
