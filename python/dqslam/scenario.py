@@ -4,11 +4,12 @@ The file is the only home of the settings; what has a default here is off by def
 their unit.
 """
 
-import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from dqslam.config import TomlFile, check_model, read_toml
 
 Positive = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
@@ -207,26 +208,26 @@ def load_scenario(source: str | Path) -> Scenario:
     ------
     FileNotFoundError
         When there is no such file; lists the names that come with dqslam.
-    ValueError
-        When the file is no scenario; names the file and every wrong setting.
+    FileError
+        When the file is no scenario; names the file, and the line of every wrong setting.
     """
     path = _find(source)
-    settings = _read(path)
-    if isinstance(base := settings.get("base"), str):
-        del settings["base"]
-        settings = _merged(_read(_find(base)), settings)
-    try:
-        return Scenario.model_validate({"name": path.stem} | settings)
-    except ValidationError as error:
-        raise ValueError(f"{path}: {_in_one_line(error)}") from None
+    file = read_toml(path)
+    settings = _with_base(file) if "base" in file.content else file.content
+    return check_model(Scenario, {"name": path.stem} | settings, file)
 
 
-def _read(path: Path) -> dict[str, Any]:
-    try:
-        with path.open("rb") as file:
-            return tomllib.load(file)
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ValueError(f"{path}: not a TOML file: {error}") from None
+def _with_base(file: TomlFile) -> dict[str, Any]:
+    """Return the settings of the base of a file, with the changes that the file makes."""
+    base = file.content["base"]
+    if not isinstance(base, str):
+        raise file.error(("base",), f"base: expected the name of a scenario, not {base!r}")
+    settings = read_toml(_find(base)).content
+    if "base" in settings:
+        raise file.error(("base",), f"base: {base} is not whole, but has a base itself")
+    return _merged(
+        settings, {name: value for name, value in file.content.items() if name != "base"}
+    )
 
 
 def _merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
@@ -236,19 +237,6 @@ def _merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
         if isinstance(base[name], dict) and isinstance(changes[name], dict):
             result[name] = base[name] | changes[name]
     return result
-
-
-def _in_one_line(error: ValidationError) -> str:
-    return "; ".join(
-        f"{_name(item['loc'])}: {item['msg']}".removeprefix(": ") for item in error.errors()
-    )
-
-
-def _name(location: tuple[int | str, ...]) -> str:
-    """Name a setting as in the file: without the kind that follows the name of its section."""
-    section, setting = location[:1], location[1:]
-    has_kind = section and section[0] in ("path", "world", "odometry")
-    return ".".join(map(str, section + (setting[1:] if has_kind else setting)))
 
 
 def _folders() -> list[Path]:

@@ -1,13 +1,14 @@
 """How large objects are before any is seen: one prior for all, or a table of one per class."""
 
-import tomllib
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
+
+from dqslam.config import load_toml_model
 
 
 @dataclass(frozen=True)
@@ -63,17 +64,9 @@ def load_size_priors(path: str | Path) -> SizePriors:
 
     Raises
     ------
-    FileNotFoundError
-        When there is no such file.
-    ValueError
-        When the file is no such table; names the file and every wrong setting.
+    FileError
+        When the file is missing, or no such table; names the line of every wrong setting.
     """
-    try:
-        table = _Table.model_validate(tomllib.loads(Path(path).read_text(encoding="utf-8")))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ValueError(f"{path}: not a TOML file: {error}") from None
-    except ValidationError as error:
-        wrong = [f"{'.'.join(map(str, one['loc']))}: {one['msg']}" for one in error.errors()]
-        raise ValueError(f"{path}: {'; '.join(wrong)}") from None
+    table = load_toml_model(path, _Table)
     classes = {name: entry.prior() for name, entry in table.classes.items()}
     return SizePriors(classes, SizePrior() if table.default is None else table.default.prior())

@@ -9,6 +9,7 @@ from typing import Any
 
 import typer
 
+from dqslam._files import FileErrors
 from dqslam.cli.ablation import ablation
 from dqslam.cli.convert import convert
 from dqslam.cli.degeneracy import degeneracy
@@ -51,7 +52,8 @@ _UsageError: Any = typer.BadParameter.__mro__[1]
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command and return its exit code, one of `EXIT_CODES`.
 
-    Bad input is one line on stderr; an error that is ours keeps its traceback.
+    Bad input is one line on stderr, a file of settings one for each mistake; an error that is ours
+    keeps its traceback.
     """
     try:
         code = app(arguments, prog_name="dqslam", standalone_mode=False) or 0
@@ -59,8 +61,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         code = _INTERRUPTED
     except (_UsageError, ValueError, OSError, RuntimeError) as error:
         message = error.format_message() if isinstance(error, _UsageError) else str(error)
-        if message:  # a bare `dqslam` has shown its help already
-            _say(message)
+        for mistake in message.splitlines() if isinstance(error, FileErrors) else [message]:
+            if mistake:  # a bare `dqslam` has shown its help already
+                _say(mistake)
         code = _BAD_INPUT
     if code == _INTERRUPTED:
         _say("stopped")

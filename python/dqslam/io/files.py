@@ -1,4 +1,4 @@
-"""Text files: read with errors that name the file and the line, write whole or not at all."""
+"""Rows, numbers, folders and JSON: errors name the file and the line, nothing is half written."""
 
 from __future__ import annotations
 
@@ -7,34 +7,16 @@ import json
 import math
 import os
 import shutil
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-
-class FileError(ValueError):
-    """What is wrong in a file, as ``path:line: message`` (or ``path: message``)."""
-
-    def __init__(self, path: str | Path, message: str, line: int | None = None) -> None:
-        super().__init__(f"{path}: {message}" if line is None else f"{path}:{line}: {message}")
-
-
-def read_text(path: str | Path) -> str:
-    """Read a UTF-8 file; a missing, unreadable or empty one is a FileError."""
-    try:
-        text = Path(path).read_text(encoding="utf-8-sig")
-    except FileNotFoundError:
-        raise FileError(path, "no such file") from None
-    except OSError as error:
-        raise FileError(path, f"cannot be read: {error.strerror}") from None
-    except UnicodeDecodeError:
-        raise FileError(path, "is not a text file (UTF-8)") from None
-    if not text.strip():
-        raise FileError(path, "is empty")
-    return text
+from dqslam._files import FileError as FileError
+from dqslam._files import read_text as read_text
+from dqslam._files import write_text as write_text
 
 
 def read_rows(path: str | Path) -> tuple[list[str], list[int]]:
@@ -85,22 +67,6 @@ def _blame_cell(path: str | Path, name: str, cells: Sequence[str], lines: Sequen
         except ValueError:
             what = f"{cell.strip()!r}, not a number" if cell.strip() else "empty"
             raise FileError(path, f"{name} is {what}", line) from None
-
-
-def write_text(path: str | Path, parts: str | Iterable[str]) -> None:
-    """Write a file under a temporary name, then rename: readers never see half a file."""
-    path = Path(path)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with temporary.open("w", encoding="utf-8", newline="\n") as file:
-            file.writelines([parts] if isinstance(parts, str) else parts)
-        temporary.replace(path)
-    except OSError as error:
-        raise FileError(path, f"cannot be written: {error.strerror}") from None
-    finally:
-        with contextlib.suppress(OSError):
-            temporary.unlink(missing_ok=True)
 
 
 @contextlib.contextmanager

@@ -1,0 +1,53 @@
+"""Text files: read and written whole, with errors that name the file and the line."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+
+class FileError(ValueError):
+    """What is wrong in a file, as ``path:line: message`` (or ``path: message``)."""
+
+    def __init__(self, path: str | Path, message: str, line: int | None = None) -> None:
+        super().__init__(f"{path}: {message}" if line is None else f"{path}:{line}: {message}")
+
+
+class FileErrors(FileError):
+    """All that is wrong in a file, a line each."""
+
+    def __init__(self, errors: Sequence[FileError]) -> None:
+        ValueError.__init__(self, "\n".join(map(str, errors)))
+
+
+def read_text(path: str | Path) -> str:
+    """Read a UTF-8 file; a missing, unreadable or empty one is a FileError."""
+    try:
+        text = Path(path).read_text(encoding="utf-8-sig")
+    except FileNotFoundError:
+        raise FileError(path, "no such file") from None
+    except OSError as error:
+        raise FileError(path, f"cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise FileError(path, "is not a text file (UTF-8)") from None
+    if not text.strip():
+        raise FileError(path, "is empty")
+    return text
+
+
+def write_text(path: str | Path, parts: str | Iterable[str]) -> None:
+    """Write a file under a temporary name, then rename: readers never see half a file."""
+    path = Path(path)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with temporary.open("w", encoding="utf-8", newline="\n") as file:
+            file.writelines([parts] if isinstance(parts, str) else parts)
+        temporary.replace(path)
+    except OSError as error:
+        raise FileError(path, f"cannot be written: {error.strerror}") from None
+    finally:
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)

@@ -1,0 +1,29 @@
+"""Settings into the text of a TOML file."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+
+def toml_text(settings: Mapping[str, Any]) -> str:
+    """Write settings, a line each, without those that are None, which TOML has no word for.
+
+    Texts, numbers, truth values and lists of them, by names that need no quotes.
+    """
+    lines = (f"{name} = {_value(value)}\n" for name, value in settings.items() if value is not None)
+    return "".join(lines)
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, int | float):
+        return repr(value)
+    if isinstance(value, str):
+        # JSON's escapes are TOML's; only DEL may stand as it is in JSON alone.
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_value, value))}]"
+    raise TypeError(f"no setting of a file: {value!r}")
