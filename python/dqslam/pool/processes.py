@@ -1,0 +1,78 @@
+"""Items in processes of this machine, with nothing but the standard library."""
+
+import multiprocessing
+import os
+import signal
+import time
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
+from threading import Thread
+from typing import TypeVar
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+# Items are what runs side by side: threads within them would only get in each other's way.
+ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+
+
+def run_in_processes(
+    function: Callable[[Item], Result], items: Iterable[Item], jobs: int
+) -> Generator[Result, None, None]:
+    """Yield results as processes finish them."""
+    executor = ProcessPoolExecutor(
+        jobs,
+        # Spawned, not forked: the parent may hold locks of threads that a fork would not copy.
+        multiprocessing.get_context("spawn"),
+        end_with_parent,
+        initargs=(os.getpid(),),
+    )
+    try:
+        # Processes inherit both. Were they interrupted while they start, they would say much.
+        with interrupts_held(), _environment(ONE_THREAD):
+            futures = [executor.submit(function, item) for item in items]
+        for future in as_completed(futures):
+            yield future.result()
+    finally:
+        executor.shutdown(cancel_futures=True)
+
+
+@contextmanager
+def interrupts_held() -> Iterator[None]:
+    """Put off Ctrl-C in this thread."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
+def _environment(changes: Mapping[str, str]) -> Iterator[None]:
+    """Set the variables that have no value yet, for a while."""
+    added = {name: value for name, value in changes.items() if name not in os.environ}
+    os.environ.update(added)
+    try:
+        yield
+    finally:
+        for name in added:
+            os.environ.pop(name, None)
+
+
+def end_with_parent(parent: int) -> None:
+    """Let Ctrl-C end this process at once and in silence, and the end of its parent, a process id.
+
+    Ctrl-C is left alone where the parent ignores it.
+    """
+    if signal.getsignal(signal.SIGINT) != signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+    Thread(target=_outlive, args=(parent,), daemon=True).start()
+
+
+def _outlive(parent: int) -> None:
+    """End this process soon after its parent, which may be killed without a word."""
+    while os.getppid() == parent:
+        time.sleep(1.0)
+    os._exit(1)
