@@ -17,6 +17,8 @@ from dqslam.evaluate.objects import match_by_id as match_by_id
 from dqslam.evaluate.objects import match_nearest as match_nearest
 from dqslam.evaluate.objects import orientation_error as orientation_error
 from dqslam.evaluate.objects import size_error as size_error
+from dqslam.evaluate.outline import project_outlines as project_outlines
+from dqslam.evaluate.outline import through_lens as through_lens
 from dqslam.evaluate.simulation import Report as Report
 from dqslam.evaluate.simulation import box_volumes as box_volumes
 from dqslam.evaluate.simulation import cube_volumes as cube_volumes
