@@ -1,0 +1,87 @@
+"""Settings of the site: ./run docs builds it from this folder into build/docs."""
+
+import re
+import sys
+from pathlib import Path
+
+DOCS = Path(__file__).resolve().parent
+ROOT = DOCS.parent
+sys.path.insert(0, str(DOCS / "extensions"))
+
+project = "dqslam"
+author = "The dqslam authors"
+copyright = author
+version = release = re.search(
+    r"VERSION\s+(\d+\.\d+\.\d+)", (ROOT / "CMakeLists.txt").read_text(encoding="utf-8")
+)[1]
+
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx_copybutton",
+    "sphinx_gallery.gen_gallery",
+    # From docs/extensions:
+    "core_signatures",
+    "mathml",
+    "paper_table",
+    "repository_pages",
+]
+exclude_patterns = ["extensions", "_generated/gallery/*.ipynb", "_generated/gallery/*.py"]
+# What the build writes into this folder; git ignores it.
+generated = DOCS / "_generated"
+
+# Markdown as a forge shows it: $ for mathematics, headings as targets of links.
+myst_enable_extensions = ["dollarmath", "fieldlist", "attrs_inline"]
+myst_heading_anchors = 3
+suppress_warnings = ["config.cache"]  # sphinx-gallery's settings hold a function
+
+# Every name in a signature is a link or is listed here: what other projects document.
+nitpicky = True
+nitpick_ignore_regex = [
+    ("py:.*", r"(numpy|np|pathlib|collections|typing|pydantic|typer|enum|matplotlib)\..*"),
+    ("py:.*", r"(Any|ArrayLike|Path|Callable|Mapping|Sequence|Iterable|Literal|Self|optional)"),
+    ("py:.*", r"(Floats|Ints|Bools|float64|int64|bool|BaseModel|Figure|Axes|ValidationError)"),
+    # Private parts and helpers that public signatures mention.
+    ("py:.*", r"dqslam\..*\._.*"),
+]
+autodoc_member_order = "bysource"
+autodoc_typehints = "signature"
+autodoc_type_aliases = {name: name for name in ("Floats", "Ints", "Bools", "Align", "Ids")}
+autodoc_preserve_defaults = True
+napoleon_numpy_docstring = True
+napoleon_google_docstring = False
+napoleon_use_rtype = False
+python_maximum_signature_line_length = 80
+add_module_names = False
+
+html_theme = "furo"
+html_title = f"dqslam {release}"
+html_static_path = ["static"]
+html_css_files = ["site.css"]
+html_math_renderer = "mathml"
+html_copy_source = False
+html_theme_options = {
+    "sidebar_hide_name": False,
+    "light_css_variables": {"color-brand-primary": "#0072B2", "color-brand-content": "#0072B2"},
+    "dark_css_variables": {"color-brand-primary": "#56B4E9", "color-brand-content": "#56B4E9"},
+}
+
+sphinx_gallery_conf = {
+    "examples_dirs": [str(ROOT / "examples")],
+    "gallery_dirs": [str(generated / "gallery")],
+    "filename_pattern": r"plot_",
+    "ignore_pattern": r"__init__|cpp",
+    "within_subsection_order": "FileNameSortKey",
+    "abort_on_example_error": True,
+    "download_all_examples": False,
+    "show_memory": False,
+    "min_reported_time": 1000,
+    "backreferences_dir": None,
+    "remove_config_comments": True,
+}
+
+dqslam_paper_trials = 50  # seeds of the table and figure that the build makes
+
+copybutton_prompt_text = "$ "
+copybutton_exclude = ".linenos, .gp"
