@@ -29,7 +29,9 @@ def run_in_loky(
         with interrupts_held():  # processes inherit it; interrupted at their start, they say much
             results = parallel(delayed(function)(item) for item in items)
     try:
-        yield from results
+        # "yield from" would hand a stop on to joblib, past what is below.
+        for result in results:  # noqa: UP028
+            yield result
     finally:
         with warnings.catch_warnings():  # of results that nobody takes: that is what a stop means
             warnings.simplefilter("ignore")
