@@ -1,0 +1,28 @@
+// Cholesky factorisation of a symmetric positive definite BlockMatrix.
+#pragma once
+
+#include <Eigen/SparseCholesky>
+
+#include "dqslam/block_matrix.h"
+
+namespace dqslam {
+
+/// A + diag(damping) = L L^T, as often as the values of A change. One thread; the same bits each
+/// time.
+class BlockCholesky {
+ public:
+  /// Orders the blocks and lays out the factor, from the pattern of A alone.
+  explicit BlockCholesky(const BlockMatrix& A);
+
+  /// `A` has the pattern that the constructor saw; one damping per row.
+  /// False when A + diag(damping) is not positive definite or not finite: then there is no factor.
+  bool Factorize(const BlockMatrix& A, const Eigen::VectorXd& damping);
+
+  /// (A + diag(damping))^-1 b of the last call of Factorize, which must have returned true.
+  Eigen::VectorXd Solve(const Eigen::VectorXd& b) const;
+
+ private:
+  Eigen::SimplicialLLT<Eigen::SparseMatrix<double>> factor_;
+};
+
+}  // namespace dqslam
