@@ -38,6 +38,7 @@ def test_writes_what_it_says(files, orbit, capsys):
     assert sorted(path.name for path in out.iterdir()) == [
         "boxes.csv",
         "camera.json",
+        "config.toml",
         "map.json",
         "odometry.txt",
         "report.json",

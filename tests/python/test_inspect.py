@@ -370,7 +370,7 @@ def test_printed_and_strict(files, capsys):
     files[0].write_text(json.dumps(camera | {"width": 480, "height": 640}))
     assert call(files, "--ids", "track_id") == 0
     assert "warning: image size: the principal point" in capsys.readouterr().out
-    assert call(files, "--ids", "track_id", "--strict") == 1
+    assert call(files, "--ids", "track_id", "--strict") == 3
 
 
 @pytest.mark.parametrize(

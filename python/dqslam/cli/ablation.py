@@ -1,13 +1,14 @@
 """``dqslam ablation``: what each part of the estimator is worth."""
 
 import os
-from importlib.util import find_spec
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dqslam.cli.progress import show_progress
+from dqslam.cli.options import FirstSeed, Jobs, ResultDirectory
+from dqslam.cli.output import Json, Output, Quiet
+from dqslam.cli.results import draw_figure, results_directory, uninterrupted
+from dqslam.cli.settings import CONFIG, ConfigFile, save_settings
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -16,22 +17,25 @@ if TYPE_CHECKING:
 
 
 def ablation(
-    out: Annotated[Path, typer.Option(help="Directory for ablation.json and ablation.png.")],
-    trials: Annotated[int, typer.Option(min=1, help="Seeds to run; each takes a minute.")] = 10,
-    seed: Annotated[int, typer.Option(min=0, help="The first of them.")] = 0,
-    jobs: Annotated[int | None, typer.Option(min=1, help="Processes; default: all cores.")] = None,
+    context: typer.Context,
+    out: ResultDirectory,
+    trials: Annotated[int, typer.Option(min=1, help="Drives to solve; each takes a minute.")] = 10,
+    seed: FirstSeed = 0,
+    jobs: Jobs = None,
+    config: ConfigFile = None,
+    quiet: Quiet = False,
+    json: Json = False,
 ) -> None:
     """Solve the paper's scenario with one part of the estimator changed at a time.
 
-    Writes ablation.json and ablation.png.
+    Writes ablation.json, ablation.png and config.toml.
     """
-    from rich.console import Console
-
     from dqslam.ablation import run_ablation
+    from dqslam.plot.ablation import plot_ablation
     from dqslam.scenario import load_scenario
 
-    out.mkdir(parents=True, exist_ok=True)
-    with show_progress(trials) as progress:
+    output = Output(quiet=quiet, as_json=json)
+    with results_directory(out), output.trials(trials) as progress:
         table = run_ablation(
             load_scenario("paper"),
             trials=trials,
@@ -39,17 +43,12 @@ def ablation(
             jobs=jobs or os.cpu_count() or 1,
             progress=progress,
         )
-    table.save(out / "ablation.json")
-    console = Console()
-    console.print(_results(table))
-    console.print(f"wrote {out / 'ablation.json'}", markup=False)
-    if find_spec("matplotlib") is None:
-        console.print("no ablation.png: matplotlib is missing (pip install 'dqslam[plot]')")
-        return
-    from dqslam.plot.ablation import plot_ablation
-
-    plot_ablation(table, out / "ablation.png")
-    console.print(f"wrote {out / 'ablation.png'}", markup=False)
+    output.table(_results(table))
+    with uninterrupted():
+        table.save(out / "ablation.json")
+        save_settings(context, out / CONFIG)
+        output.file(out / "ablation.json")
+        draw_figure(output, out / "ablation.png", lambda path: plot_ablation(table, path))
 
 
 def _results(table: "AblationTable") -> "Table":

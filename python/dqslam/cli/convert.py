@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from dqslam.cli.options import FrameRate, FrameTimesFile
+from dqslam.cli.output import Json, Output, Quiet
 
 
 def convert(
@@ -25,7 +26,7 @@ def convert(
     frame_rate: FrameRate = None,
     classes: Annotated[
         Path | None,
-        typer.Option(help="Names of classes: COCO JSON, data.yaml, or a text of one a line."),
+        typer.Option(help="Names of classes: COCO JSON, data.yaml, or a text, one a line."),
     ] = None,
     camera_in_body: Annotated[
         Path | None,
@@ -36,16 +37,17 @@ def convert(
     topic: Annotated[
         list[str] | None, typer.Option(metavar="NAME", help="Of a bag with several; repeatable.")
     ] = None,
+    quiet: Quiet = False,
+    json: Json = False,
 ) -> None:
     """Write a camera, a trajectory or detections in another format; a bag as a folder of all.
 
     Formats: json toml ros colmap kitti-calib | tum kitti euroc | csv coco yolo mot | rosbag (read).
     Times that OUT has no place for go into a file beside it.
     """
-    from rich.console import Console
-
     from dqslam import io
 
+    output = Output(quiet=quiet, as_json=json)
     size = None
     if camera is not None:
         lens = io.read_camera(camera)
@@ -61,9 +63,14 @@ def convert(
         classes=None if classes is None else io.read_class_names(classes),
         body_from_camera=None if camera_in_body is None else io.read_mount(camera_in_body),
     )
-    written = io.convert(source, out, format=format_, to=to, topics=topic or (), context=context)
-    console = Console()
+    with output.waiting("converting"):
+        written = io.convert(
+            source, out, format=format_, to=to, topics=topic or (), context=context
+        )
     for file in written:
         loses = f"; no place for {' and '.join(file.loses)}" if file.loses else ""
-        text = f"wrote {file.path}: {file.what}{loses}"
-        console.print(text, markup=False, highlight=False, soft_wrap=True)
+        output.line(f"wrote {file.path}: {file.what}{loses}")
+    described = [
+        {"path": str(file.path), "what": file.what, "loses": file.loses} for file in written
+    ]
+    output.document({"written": described})

@@ -1,12 +1,13 @@
 """``dqslam degeneracy``: which motions determine an object."""
 
-from importlib.util import find_spec
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dqslam.cli.progress import show_progress
+from dqslam.cli.options import FirstSeed, ResultDirectory
+from dqslam.cli.output import Json, Output, Quiet
+from dqslam.cli.results import draw_figure, results_directory, uninterrupted
+from dqslam.cli.settings import CONFIG, ConfigFile, save_settings
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -15,32 +16,30 @@ if TYPE_CHECKING:
 
 
 def degeneracy(
-    out: Annotated[Path, typer.Option(help="Directory for degeneracy.json and degeneracy.png.")],
+    context: typer.Context,
+    out: ResultDirectory,
     trials: Annotated[int, typer.Option(min=1, help="Objects to see along each motion.")] = 50,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the first of them.")] = 0,
+    seed: FirstSeed = 0,
+    config: ConfigFile = None,
+    quiet: Quiet = False,
+    json: Json = False,
 ) -> None:
     """Look at objects along four motions on the plane, poses known, and solve from three starts.
 
-    Writes degeneracy.json and degeneracy.png.
+    Writes degeneracy.json, degeneracy.png and config.toml.
     """
-    from rich.console import Console
-
     from dqslam.degeneracy import run_degeneracy
-
-    out.mkdir(parents=True, exist_ok=True)
-    with show_progress(trials) as progress:
-        table = run_degeneracy(trials=trials, seed=seed, progress=progress)
-    table.save(out / "degeneracy.json")
-    console = Console()
-    console.print(_results(table))
-    console.print(f"wrote {out / 'degeneracy.json'}", markup=False)
-    if find_spec("matplotlib") is None:
-        console.print("no degeneracy.png: matplotlib is missing (pip install 'dqslam[plot]')")
-        return
     from dqslam.plot.degeneracy import plot_degeneracy
 
-    plot_degeneracy(table, out / "degeneracy.png")
-    console.print(f"wrote {out / 'degeneracy.png'}", markup=False)
+    output = Output(quiet=quiet, as_json=json)
+    with results_directory(out), output.trials(trials) as progress:
+        table = run_degeneracy(trials=trials, seed=seed, progress=progress)
+    output.table(_results(table))
+    with uninterrupted():
+        table.save(out / "degeneracy.json")
+        save_settings(context, out / CONFIG)
+        output.file(out / "degeneracy.json")
+        draw_figure(output, out / "degeneracy.png", lambda path: plot_degeneracy(table, path))
 
 
 def _results(table: "DegeneracyTable") -> "Table":

@@ -5,11 +5,16 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from dqslam.cli.output import Json, Output, Quiet
+from dqslam.cli.results import uninterrupted
+from dqslam.cli.settings import ConfigFile, save_settings
+
 if TYPE_CHECKING:
     from rich.table import Table
 
 
 def evaluate(
+    context: typer.Context,
     directory: Annotated[Path, typer.Argument(metavar="DIR", help="What `dqslam run` wrote.")],
     groundtruth: Annotated[
         Path, typer.Option(help="True trajectory, world_from_camera, in any world frame.")
@@ -18,8 +23,12 @@ def evaluate(
         Literal["se3", "sim3", "se2", "none"],
         typer.Option(help="Motion between both worlds to remove: rigid, with scale, on the plane."),
     ] = "se3",
-    rpe_delta: Annotated[float, typer.Option(help="Relative pose error: over how much.")] = 1.0,
-    rpe_unit: Annotated[Literal["frames", "metres"], typer.Option(help="Of that.")] = "frames",
+    rpe_delta: Annotated[
+        float, typer.Option(help="Frames or metres over which the relative pose error is taken.")
+    ] = 1.0,
+    rpe_unit: Annotated[
+        Literal["frames", "metres"], typer.Option(help="What --rpe-delta counts.")
+    ] = "frames",
     objects: Annotated[
         Path | None, typer.Option(help="CSV of true objects: x,y,z,class_name,sx,sy,sz,...")
     ] = None,
@@ -41,16 +50,15 @@ def evaluate(
         float | None,
         typer.Option(help="Seconds that count as the same. Default: half the interval of poses."),
     ] = None,
-    json: Annotated[
-        bool, typer.Option("--json", help="Print evaluation.json instead of tables.")
-    ] = False,
+    config: ConfigFile = None,
+    quiet: Quiet = False,
+    json: Json = False,
 ) -> None:
     """Compare the trajectory, the objects and the boxes of DIR with the truth.
 
-    Writes DIR/evaluation.json; docs/evaluation.md says what each number is.
+    Writes evaluation.json, and its options as evaluation.toml, into DIR. docs/evaluation.md says
+    what each number is.
     """
-    from rich.console import Console
-
     from dqslam import io
     from dqslam.evaluate_results import evaluate_results
 
@@ -58,30 +66,32 @@ def evaluate(
         raise ValueError(f"--gate: {gate:g} is not positive")
     if max_time_difference is not None and not max_time_difference >= 0.0:
         raise ValueError(f"--max-time-difference: {max_time_difference:g} is negative")
-    results = io.load_results(directory)
-    evaluation = evaluate_results(
-        results,
-        io.read_trajectory(groundtruth, repeated_times=True),
-        align=align,
-        rpe_delta=rpe_delta,
-        rpe_unit=rpe_unit,
-        objects=None if objects is None else io.read_true_objects(objects),
-        match=match,
-        gate=gate,
-        boxes=None if boxes is None else io.read_true_boxes(boxes, results.camera, box_ids),
-        max_time_difference=max_time_difference,
-    )
-    path = directory / "evaluation.json"
-    io.write_json(path, evaluation)
-    if json:
-        typer.echo(path.read_text(encoding="utf-8"), nl=False)
-        return
-    console = Console()
-    console.print(_trajectory(evaluation))
-    console.print(_boxes_and_objects(evaluation))
+    output = Output(quiet=quiet, as_json=json)
+    with output.steps("evaluating", 3) as done:
+        results = io.load_results(directory)
+        done()
+        truth = io.read_trajectory(groundtruth, repeated_times=True)
+        done()
+        evaluation = evaluate_results(
+            results,
+            truth,
+            align=align,
+            rpe_delta=rpe_delta,
+            rpe_unit=rpe_unit,
+            objects=None if objects is None else io.read_true_objects(objects),
+            match=match,
+            gate=gate,
+            boxes=None if boxes is None else io.read_true_boxes(boxes, results.camera, box_ids),
+            max_time_difference=max_time_difference,
+        )
+    output.table(_trajectory(evaluation))
+    output.table(_boxes_and_objects(evaluation))
     if evaluation["objects"] is not None:
-        console.print(_pairs(evaluation["objects"]["pairs"]))
-    console.print(f"wrote {path}", markup=False, highlight=False, soft_wrap=True)
+        output.table(_pairs(evaluation["objects"]["pairs"]))
+    with uninterrupted():
+        io.write_json(directory / "evaluation.json", evaluation)
+        save_settings(context, directory / "evaluation.toml")
+    output.file(directory / "evaluation.json")
 
 
 def _trajectory(evaluation: dict[str, Any]) -> "Table":

@@ -1,6 +1,5 @@
 """``dqslam inspect``: what is in a recording, and which of the usual mistakes."""
 
-import json
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
@@ -14,6 +13,8 @@ from dqslam.cli.options import (
     MaxTimeDifference,
     OdometryFile,
 )
+from dqslam.cli.output import Json, Output, Quiet
+from dqslam.cli.settings import ConfigFile
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from dqslam.inspect_recording import Inspection
 
 MOST_LISTED = 8
+FOUND = 3  # exit code of --strict
 
 
 def inspect(
@@ -35,10 +37,12 @@ def inspect(
         typer.Option(help="The column that tells objects apart. Default: boxes that overlap."),
     ] = None,
     max_time_difference: MaxTimeDifference = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
-    strict: Annotated[bool, typer.Option("--strict", help="Exit with 1 if there are warnings.")] = (
-        False
-    ),
+    strict: Annotated[
+        bool, typer.Option("--strict", help=f"Exit with {FOUND} if there are warnings.")
+    ] = False,
+    config: ConfigFile = None,
+    quiet: Quiet = False,
+    json: Json = False,
 ) -> None:
     """Say what is in a recording, and warn of the usual mistakes.
 
@@ -48,57 +52,43 @@ def inspect(
     from dqslam import io
     from dqslam.inspect_recording import inspect_recording
 
+    output = Output(quiet=quiet, as_json=json)
     names = io.split_formats(formats or [])
-    frames = io.choose_frame_times(odometry, detections, names, times=frame_times, rate=frame_rate)
-    lens = io.read_camera(camera, names.camera)
-    table = io.read_detections(
-        detections,
-        names.detections,
-        width=lens.width,
-        height=lens.height,
-        frames=frames,
-        cut=False,
-        check=False,
-    )
-    inspection = inspect_recording(
-        lens,
-        io.read_trajectory(odometry, names.trajectory, frames=frames),
-        table,
-        ids=ids,
-        max_time_difference=max_time_difference,
-    )
-    if as_json:
-        _print_json(inspection)
-    else:
-        _show(inspection)
+    with output.steps("inspecting", 3) as done:
+        frames = io.choose_frame_times(
+            odometry, detections, names, times=frame_times, rate=frame_rate
+        )
+        lens = io.read_camera(camera, names.camera)
+        path = io.read_trajectory(odometry, names.trajectory, frames=frames)
+        done()
+        table = io.read_detections(
+            detections,
+            names.detections,
+            width=lens.width,
+            height=lens.height,
+            frames=frames,
+            cut=False,
+            check=False,
+        )
+        done()
+        inspection = inspect_recording(
+            lens, path, table, ids=ids, max_time_difference=max_time_difference
+        )
+    _show(output, inspection)
     if strict and inspection.findings:
-        raise typer.Exit(1)
+        raise typer.Exit(FOUND)
 
 
-def _print_json(inspection: "Inspection") -> None:
-    from dqslam.io.files import jsonable
-
-    content = {
-        **inspection.summary,
-        "warnings": [vars(finding) for finding in inspection.findings],
-        "unchecked": inspection.unchecked,
-    }
-    typer.echo(json.dumps(jsonable(content), indent=2, allow_nan=False, ensure_ascii=False))
-
-
-def _show(inspection: "Inspection") -> None:
-    from rich.console import Console
-
-    console = Console()
-    console.print(_overview(inspection.summary))
+def _show(output: Output, inspection: "Inspection") -> None:
+    output.table(_overview(inspection.summary))
     for finding in inspection.findings:
-        text = f"warning: {finding.check}: {finding.message}"
-        console.print(text, style="bold red", markup=False, highlight=False, soft_wrap=True)
+        output.line(f"warning: {finding.check}: {finding.message}", style="bold red")
     for check, why in inspection.unchecked.items():
-        text = f"not checked: {check}: {why}"
-        console.print(text, markup=False, highlight=False, soft_wrap=True)
+        output.line(f"not checked: {check}: {why}")
     if not inspection.findings:
-        console.print("no mistake found")
+        output.line("no mistake found")
+    warnings = [vars(finding) for finding in inspection.findings]
+    output.document({**inspection.summary, "warnings": warnings, "unchecked": inspection.unchecked})
 
 
 def _overview(summary: dict[str, Any]) -> "Table":

@@ -1,4 +1,4 @@
-"""Options that several commands share: the files of a recording, and when its frames were taken."""
+"""Options that several commands share: the files of a recording, results, trials."""
 
 from pathlib import Path
 from typing import Annotated
@@ -16,9 +16,18 @@ FrameTimesFile = Annotated[
     Path | None, typer.Option(help="Times of frames: KITTI times.txt, TUM rgb.txt, frames.csv.")
 ]
 FrameRate = Annotated[
-    float | None, typer.Option(metavar="HZ", help="Or frames a second, frame 0 at 0 s.")
+    float | None, typer.Option(metavar="HZ", help="Or frames per second, frame 0 at 0 s.")
 ]
 MaxTimeDifference = Annotated[
     float | None,
     typer.Option(help="Seconds from a box to its pose. Default: half the interval of poses."),
+]
+ResultDirectory = Annotated[
+    Path, typer.Option("--out", metavar="DIR", help="Directory of the results, made if need be.")
+]
+FirstSeed = Annotated[
+    int, typer.Option(min=0, help="Seed of the first trial; the next ones count up.")
+]
+Jobs = Annotated[
+    int | None, typer.Option(min=1, help="Processes at a time. Default: as many as cores.")
 ]

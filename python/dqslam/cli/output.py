@@ -8,6 +8,8 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from itertools import count
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -64,15 +66,21 @@ class Output:
             text = json.dumps(jsonable(content), indent=2, allow_nan=False, ensure_ascii=False)
             typer.echo(text)
 
-    @contextmanager
-    def count(self, things: str, total: int) -> Iterator[Callable[[int, int], None]]:
-        """Show a bar of the things that are done, of `total`, with the time left.
+    def file(self, path: Path) -> None:
+        """Print a JSON file that was written, if JSON is asked for; else say where it is."""
+        if self._as_json:
+            typer.echo(path.read_text(encoding="utf-8"), nl=False)
+        self.line(f"wrote {path}")
 
-        Gives a function of (done, total).
+    @contextmanager
+    def trials(self, total: int) -> Iterator[Callable[[int, int], None]]:
+        """Show a bar of the trials that are done, with the time left; gives what to tell them to.
+
+        That is a function of (trials done, trials).
         """
         from rich.progress import BarColumn, MofNCompleteColumn, TimeRemainingColumn
 
-        columns = (things, BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), "left")
+        columns = ("trials", BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), "left")
         with self._bar(columns, total) as update:
             yield lambda done, _: update(done)
 
@@ -84,6 +92,13 @@ class Output:
         columns = (what, BarColumn(), TaskProgressColumn(), TimeRemainingColumn(), "left")
         with self._bar(columns, 1.0) as update:
             yield update
+
+    @contextmanager
+    def steps(self, what: str, total: int) -> Iterator[Callable[[], None]]:
+        """Show a bar of the steps that are done, with the time left; gives what ends a step."""
+        with self.share(what) as update:
+            ended = count(1)
+            yield lambda: update(next(ended) / total)
 
     @contextmanager
     def waiting(self, what: str) -> Iterator[None]:

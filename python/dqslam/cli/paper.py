@@ -1,16 +1,17 @@
 """``dqslam paper``: the paper's table and figure."""
 
 import os
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from dqslam.cli.progress import show_progress
+from dqslam.cli.options import FirstSeed, Jobs, ResultDirectory
+from dqslam.cli.output import Json, Output, Quiet
+from dqslam.cli.results import draw_figure, results_directory, uninterrupted
+from dqslam.cli.settings import CONFIG, ConfigFile, save_settings
 
 if TYPE_CHECKING:
-    from rich.console import Console
     from rich.table import Table
 
     from dqslam.experiment import PaperTable, RowName, Statistics
@@ -42,9 +43,10 @@ EXAMPLES = 6  # maps drawn, as in the paper's figure
 
 
 def paper(
-    out: Annotated[Path, typer.Option(help="Directory for table.json and maps.png.")],
-    trials: Annotated[int, typer.Option(min=1, help="Seeds to run.")] = 50,
-    seed: Annotated[int, typer.Option(min=0, help="The first of them.")] = 0,
+    context: typer.Context,
+    out: ResultDirectory,
+    trials: Annotated[int, typer.Option(min=1, help="Drives to simulate and solve.")] = 50,
+    seed: FirstSeed = 0,
     scenario: Annotated[
         str,
         typer.Option(
@@ -72,7 +74,8 @@ def paper(
         ),
     ] = False,
     wrong_associations: Annotated[
-        float, typer.Option(min=0.0, max=0.4, help="Share of boxes with a wrong object id.")
+        float,
+        typer.Option(min=0.0, max=0.4, help="Share of boxes with a wrong object id, 0 to 0.4."),
     ] = 0.0,
     wrong_association_kind: Annotated[
         Literal["random", "structured"],
@@ -82,14 +85,15 @@ def paper(
         Literal["none", "huber", "cauchy", "dcs", "switchable", "gnc_tls", "gnc_gm"] | None,
         typer.Option(help="Robust loss on boxes. Default: none, or gnc_gm with wrong ids."),
     ] = None,
-    jobs: Annotated[int | None, typer.Option(min=1, help="Processes; default: all cores.")] = None,
+    jobs: Jobs = None,
+    config: ConfigFile = None,
+    quiet: Quiet = False,
+    json: Json = False,
 ) -> None:
     """Run the paper's experiment, or another scenario's, and print its table.
 
-    Writes table.json and maps.png, six of the trials.
+    Writes table.json, maps.png with six of the trials, and config.toml.
     """
-    from rich.console import Console
-
     from dqslam.experiment import run_paper
     from dqslam.scenario import load_scenario
 
@@ -102,8 +106,8 @@ def paper(
         "objects": objects or chosen.objects,
         "detector": chosen.detector.model_copy(update=wrong),
     }
-    out.mkdir(parents=True, exist_ok=True)
-    with show_progress(trials) as progress:
+    output = Output(quiet=quiet, as_json=json)
+    with results_directory(out), output.trials(trials) as progress:
         table = run_paper(
             chosen.model_copy(update=changes),
             trials=trials,
@@ -114,16 +118,17 @@ def paper(
             jobs=jobs or os.cpu_count() or 1,
             progress=progress,
         )
-    table.save(out / "table.json")
-    console = Console()
-    console.print(_results(table))
+    output.table(_results(table))
     if method == "paper":
-        console.print(_scan(table))
+        output.table(_scan(table))
     for row, title in ROWS.items():
         for failed, why in table.best(row).failures.items():
-            console.print(f"failed: {title}, seed {failed}: {why}", markup=False)
-    console.print(f"wrote {out / 'table.json'}", markup=False)
-    _draw(table, out / "maps.png", console)
+            output.line(f"failed: {title}, seed {failed}: {why}")
+    with uninterrupted():
+        table.save(out / "table.json")
+        save_settings(context, out / CONFIG)
+        output.file(out / "table.json")
+        _draw(table, out / "maps.png", output)
 
 
 def _results(table: "PaperTable") -> "Table":
@@ -203,17 +208,12 @@ def _score_cells(score: "float | list[float] | dict[str, float]") -> list[str]:
     return [f"{number:.2f}" for number in numbers]
 
 
-def _draw(table: "PaperTable", path: Path, console: "Console") -> None:
+def _draw(table: "PaperTable", path: Path, output: Output) -> None:
     from dqslam.experiment import example_maps
-
-    if find_spec("matplotlib") is None:
-        console.print("no maps.png: matplotlib is missing (pip install 'dqslam[plot]')")
-        return
     from dqslam.plot import plot_maps
 
     maps = example_maps(table, EXAMPLES)
     if not maps:
-        console.print("no maps.png: no monocular trial succeeded")
+        output.line(f"no {path.name}: no monocular trial succeeded")
         return
-    plot_maps(maps, path)
-    console.print(f"wrote {path}", markup=False)
+    draw_figure(output, path, lambda path: plot_maps(maps, path))

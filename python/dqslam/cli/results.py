@@ -1,0 +1,53 @@
+"""Where a command writes: the directory of its results, all of them or none."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from dqslam.cli.output import Output
+
+
+@contextmanager
+def results_directory(path: Path) -> Iterator[None]:
+    """Make a directory before the work is done; if that fails, leave none that is empty."""
+    missing = [one for one in (path, *path.parents) if not one.exists()]
+    path.mkdir(parents=True, exist_ok=True)
+    try:
+        yield
+    except BaseException:
+        with suppress(OSError):  # it is not empty
+            for one in missing:
+                one.rmdir()
+        raise
+
+
+@contextmanager
+def uninterrupted() -> Iterator[None]:
+    """Put off Ctrl-C until all files of a result are there, which belong together."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    asked: list[int] = []
+    before = signal.signal(signal.SIGINT, lambda number, _: asked.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if asked:
+        raise KeyboardInterrupt
+
+
+def draw_figure(output: Output, path: Path, draw: Callable[[Path], None]) -> None:
+    """Draw an image file, or say why there is none: figures are an extra."""
+    if find_spec("matplotlib") is None:
+        output.line(f"no {path.name}: matplotlib is missing (pip install 'dqslam[plot]')")
+        return
+    draw(path)
+    output.line(f"wrote {path}")

@@ -1,0 +1,117 @@
+"""What ``dqslam run`` shows: a report as tables and lines."""
+
+from typing import TYPE_CHECKING, Any
+
+from dqslam.cli.output import Output
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+
+def show_report(output: Output, report: dict[str, Any]) -> None:
+    """Show a report: an overview, its objects, and what is to be known of the result."""
+    output.table(_overview(report))
+    if report["objects"]:
+        output.table(_objects(report["objects"]))
+    lines = [f"object {name} is not in the map: {why}" for name, why in _dropped(report)]
+    lines += [f"under-constrained: {sentence}" for sentence in report["under_constrained"]]
+    if report["solver"] is None:
+        lines.append("no object fits a world at rest: the trajectory is the odometry")
+    else:
+        lines.append(_solver(report["solver"]))
+    for line in lines:
+        output.line(line)
+
+
+def _dropped(report: dict[str, Any]) -> list[tuple[str, str]]:
+    return sorted(report["dropped_objects"].items(), key=lambda item: int(item[0]))
+
+
+def _solver(solver: dict[str, Any]) -> str:
+    return (
+        f"solver: {solver['message']} ({solver['iterations']} iterations, "
+        f"{solver['rejected_steps']} rejected, {solver['seconds']:.2f} s)"
+    )
+
+
+def _overview(report: dict[str, Any]) -> "Table":
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    boxes = report["boxes"]
+    table = Table(box=SIMPLE_HEAD, show_header=False)
+    table.add_row("poses", f"{report['poses']}, {report['keyframes']} of them keyframes")
+    table.add_row(
+        "boxes",
+        f"{boxes['count']} of {len(report['objects'])} objects, {boxes['of_dropped_objects']} of "
+        f"objects not in the map, {boxes['unassigned']} of none",
+    )
+    table.add_row("left out", _left_out(report["dropped_boxes"], report["ids"]))
+    if boxes["count"]:
+        table.add_row(
+            "chi-square of a box",
+            f"median {boxes['chi2_median']:.2f} (3.36 expected); {boxes['outlier_share']:.1%} do "
+            f"not fit (above 13.28), {boxes['not_in_front']} of them not even in front",
+        )
+    table.add_row("re-projection", _reprojection(report["reprojection"]))
+    table.add_row("odometry noise", _noise(report["odometry_noise"]))
+    error = report["trajectory_error"]
+    if error is None:
+        table.add_row("trajectory error", "unknown: there is nothing to compare with")
+        return table
+    for name, title in (("ate_rmse_m", "rmse after alignment"), ("mean_m", "mean, same start")):
+        before, after = error["before"][name], error["after"][name]
+        word = "better" if after < before else "worse" if after > before else "unchanged"
+        table.add_row(title, f"odometry {before:.4f} m, estimate {after:.4f} m: {word}")
+    return table
+
+
+def _reprojection(overlap: dict[str, Any]) -> str:
+    if overlap["iou_median"] is None:
+        return "no box shows an object of the map"
+    which = "held out" if overlap["held_out"] else "used"
+    return (
+        f"median IoU {overlap['iou_median']:.2f} of the boxes {which}; "
+        f"{overlap['explained_share']:.0%} of those of mapped classes reach 0.5"
+    )
+
+
+def _noise(noise: dict[str, Any]) -> str:
+    if noise["from"] == "given":
+        return "given"
+    return (
+        f"estimated: {1e3 * noise['translation_m']:.2f} mm, "
+        f"{1e3 * noise['rotation_rad']:.2f} mrad a step"
+    )
+
+
+def _left_out(dropped: dict[str, Any], ids: str) -> str:
+    few = dropped["few_boxes"]
+    reasons = {
+        "below the least score": dropped["below_min_score"],
+        f"without {ids}": dropped["without_id"],
+        "without a pose of their time": dropped["without_pose"],
+        "beside a better box of the same object": dropped["repeated"],
+        f"of objects with fewer than 3: {', '.join(map(str, few))}": sum(few.values()),
+    }
+    return "\n".join(f"{count} {why}" for why, count in reasons.items() if count) or "none"
+
+
+def _objects(objects: list[dict[str, Any]]) -> "Table":
+    from rich.box import SIMPLE_HEAD
+    from rich.markup import escape
+    from rich.table import Table
+
+    table = Table(box=SIMPLE_HEAD)
+    for heading in ("id", "class", "boxes", "chi-square, median", "do not fit", "not in front"):
+        table.add_column(heading, justify="left" if heading == "class" else "right")
+    for entry in objects:
+        table.add_row(
+            str(entry["id"]),
+            escape(entry["class_name"]),
+            str(entry["observations"]),
+            f"{entry['chi2_median']:.2f}",
+            f"{entry['outlier_share']:.0%}",
+            str(entry["not_in_front"]),
+        )
+    return table

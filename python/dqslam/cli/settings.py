@@ -1,0 +1,133 @@
+"""Options from a file, and the options that were in force into one: ``--config`` and config.toml.
+
+The keys are the names of the options, with underscores. An option on the command line wins over the
+file, the file over the default.
+"""
+
+from __future__ import annotations
+
+import inspect
+import types
+from pathlib import Path
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    Literal,
+    Union,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
+
+import typer
+
+if TYPE_CHECKING:
+    from pydantic import BaseModel
+
+CONFIG = "config.toml"
+# They say what is shown, not what is done.
+_NOT_SETTINGS = ("help", "config", "quiet", "json")
+
+
+def _read(context: typer.Context, path: Path | None) -> Path | None:
+    """Let the settings of a file stand in for the defaults of the options."""
+    if path is None or context.resilient_parsing:
+        return path
+    from dqslam.config import load_toml_model
+
+    settings = load_toml_model(path, settings_model(context.command)).model_dump(
+        by_alias=True, exclude_unset=True
+    )
+    parameters = setting_names(context.command)
+    context.default_map = {
+        parameters[key]: value for key, value in settings.items() if key in parameters
+    }
+    return path
+
+
+ConfigFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--config",
+        metavar="FILE",
+        is_eager=True,
+        callback=_read,
+        help="TOML file of options, as a result's config.toml; what the command line says wins.",
+    ),
+]
+
+
+def save_settings(context: typer.Context, path: Path) -> None:
+    """Write all options as they are in force to a file for `--config`.
+
+    Without those that are unset: what they default to may depend on the machine or the files.
+    """
+    from dqslam._files import write_text
+    from dqslam.config import toml_text
+
+    settings: dict[str, Any] = {"command": context.info_name, "dqslam_version": version()}
+    for key, name in setting_names(context.command).items():
+        settings[key] = _plain(context.params[name])
+    write_text(path, toml_text(settings))
+
+
+def version() -> str | None:
+    """Return the version of the installed package; None when it is not installed."""
+    from importlib import metadata
+
+    try:
+        return metadata.version("dqslam")
+    except metadata.PackageNotFoundError:
+        return None
+
+
+def setting_names(command: Any) -> dict[str, str]:
+    """Return the parameters of a command by the name that a file has for them."""
+    names = {}
+    for parameter in command.params:
+        long = [name for name in parameter.opts if name.startswith("--")]
+        key = long[0].removeprefix("--").replace("-", "_") if long else parameter.name
+        if key not in _NOT_SETTINGS:
+            names[key] = parameter.name
+    return names
+
+
+def settings_model(command: Any) -> type[BaseModel]:
+    """Make the model of the settings that a command can read from a file."""
+    from pydantic import ConfigDict, Field, create_model
+
+    annotations = get_type_hints(inspect.unwrap(command.callback), include_extras=True)
+    keys: dict[str, Any] = {
+        key: _setting_type(annotations[name]) for key, name in setting_names(command).items()
+    }
+    keys |= {"command": Literal[command.name], "dqslam_version": str}
+    # By alias: a model must not have fields of any name.
+    fields: dict[str, Any] = {
+        f"setting_{key}": (type_ | None, Field(None, alias=key)) for key, type_ in keys.items()
+    }
+    config = ConfigDict(extra="forbid", strict=True)
+    return create_model("Settings", __config__=config, **fields)
+
+
+def _setting_type(annotation: Any) -> Any:
+    """Turn the annotation of an option into the type that it has in a file, with its bounds."""
+    from pydantic import Field
+
+    if get_origin(annotation) is Annotated:
+        inner, option, *_ = get_args(annotation)
+        bounds = Field(ge=getattr(option, "min", None), le=getattr(option, "max", None))
+        found = _setting_type(inner)
+        return Annotated[found, bounds] if found in (int, float) else found
+    if get_origin(annotation) in (Union, types.UnionType):
+        (inner,) = (one for one in get_args(annotation) if one is not type(None))
+        return _setting_type(inner)
+    if get_origin(annotation) is list:
+        return list[_setting_type(get_args(annotation)[0])]  # type: ignore[misc]
+    return str if annotation is Path else annotation
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, list | tuple):
+        return [_plain(one) for one in value]
+    return str(value) if isinstance(value, Path) else value
