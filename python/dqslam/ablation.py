@@ -5,6 +5,7 @@ Objects are ellipsoids and sigmas are those of the noise, so that the bound can 
 
 import time
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from itertools import product
@@ -200,10 +201,11 @@ def run_ablation(
             raise ValueError(f"{name}: expected {least} or more, got {value}")
     done: list[Trial] = []
     run = partial(run_trial, scenario, variants=VARIANTS if variants is None else variants)
-    for trial in run_each(run, range(seed, seed + trials), jobs=min(jobs, trials)):
-        done.append(trial)
-        if progress is not None:
-            progress(len(done), trials)
+    with closing(run_each(run, range(seed, seed + trials), jobs=min(jobs, trials))) as running:
+        for trial in running:
+            done.append(trial)
+            if progress is not None:
+                progress(len(done), trials)
     return tabulate(sorted(done, key=lambda trial: trial.seed))
 
 

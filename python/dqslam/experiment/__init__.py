@@ -8,7 +8,9 @@ from dqslam.experiment.methods import Method as Method
 from dqslam.experiment.methods import RowName as RowName
 from dqslam.experiment.methods import Settings as Settings
 from dqslam.experiment.methods import beliefs as beliefs
+from dqslam.experiment.methods import default_loss as default_loss
 from dqslam.experiment.methods import method_options as method_options
+from dqslam.experiment.methods import seen_by as seen_by
 from dqslam.experiment.paper import example_maps as example_maps
 from dqslam.experiment.paper import run_paper as run_paper
 from dqslam.experiment.table import METRICS as METRICS
@@ -21,3 +23,4 @@ from dqslam.experiment.table import tabulate as tabulate
 from dqslam.experiment.trial import Outcome as Outcome
 from dqslam.experiment.trial import Trial as Trial
 from dqslam.experiment.trial import run_trial as run_trial
+from dqslam.experiment.trial import solve_and_score as solve_and_score

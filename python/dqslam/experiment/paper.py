@@ -1,6 +1,7 @@
 """Run the paper's experiment."""
 
 from collections.abc import Callable
+from contextlib import closing
 from functools import partial
 
 from dqslam.estimate import Estimate
@@ -16,7 +17,7 @@ from dqslam.experiment.methods import (
 )
 from dqslam.experiment.table import PaperTable, tabulate
 from dqslam.experiment.trial import Trial, run_trial
-from dqslam.pool import run_each
+from dqslam.pool import Backend, run_each
 from dqslam.problem import solve
 from dqslam.recording import Truth
 from dqslam.scenario import Scenario
@@ -34,6 +35,8 @@ def run_paper(
     loss: LossName | None = None,
     bound: bool = False,
     jobs: int = 1,
+    backend: Backend | None = None,
+    scheduler: str | None = None,
     progress: Progress | None = None,
 ) -> PaperTable:
     """Run trials with seeds seed, seed + 1, ... and tabulate their errors.
@@ -46,8 +49,8 @@ def run_paper(
         Whether to compare with the posterior bound and the optimum, which takes some more solves.
         The estimator is then told the true noise of the boxes and the true spread of the sizes,
         where there are such (ellipsoids).
-    jobs
-        Processes; with 1 everything runs in this one. The numbers do not depend on it, times do.
+    jobs, backend, scheduler
+        Where trials run, as in `pool.run_each`. The numbers do not depend on it, times do.
     progress
         Called with (trials done, trials) after each.
     """
@@ -57,10 +60,12 @@ def run_paper(
     settings = Settings(method, loss or default_loss(scenario, method), bound)
     run = partial(_run_seed, scenario=scenario, settings=settings)
     done: list[Trial] = []
-    for trial in run_each(run, range(seed, seed + trials), jobs=jobs):
-        done.append(trial)
-        if progress is not None:
-            progress(len(done), trials)
+    seeds = range(seed, seed + trials)
+    with closing(run_each(run, seeds, jobs=jobs, backend=backend, scheduler=scheduler)) as running:
+        for trial in running:
+            done.append(trial)
+            if progress is not None:
+                progress(len(done), trials)
     return tabulate(sorted(done, key=lambda trial: trial.seed), scenario, settings)
 
 

@@ -40,6 +40,9 @@ class Outcome:
     bound: BoundScore | None = None
     robust: RobustScore | None = None
     """Where some ids are wrong."""
+    iterations: int = 0
+    """Of all stages of the solver."""
+    converged: bool = False
 
 
 @dataclass(frozen=True)
@@ -63,7 +66,14 @@ def run_trial(scenario: Scenario, seed: int, settings: Settings) -> Trial:
         odometry_rmse_pos=position_error(truth.pose_model, poses, truth.poses),
         outcomes={
             row: tuple(
-                _outcome(seen_by(row, recording), truth, believed, settings, sigma)
+                solve_and_score(
+                    seen_by(row, recording),
+                    truth,
+                    believed,
+                    method_options(settings, sigma),
+                    told=method_options(Settings(settings.method), sigma),
+                    bound=settings.bound,
+                )
                 for sigma in candidate_sigmas(settings.method)
             )
             for row in ROWS
@@ -71,30 +81,47 @@ def run_trial(scenario: Scenario, seed: int, settings: Settings) -> Trial:
     )
 
 
-def _outcome(
-    recording: Recording, truth: Truth, believed: Beliefs, settings: Settings, sigma: float | None
+def solve_and_score(
+    recording: Recording,
+    truth: Truth,
+    believed: Beliefs,
+    options: SolveOptions,
+    *,
+    told: SolveOptions,
+    bound: bool,
 ) -> Outcome:
+    """Solve what an estimator is given and compare it with the truth.
+
+    Parameters
+    ----------
+    told
+        Options of the run that is told which ids are right, without a loss; where some are wrong.
+    bound
+        Whether to compare with the posterior bound and the optimum too.
+    """
     start = time.perf_counter()
     seconds = None
     try:
-        options = method_options(settings, sigma)
         graph = believed.graph(recording)
         solved = solve(graph, options)
         seconds = time.perf_counter() - start
         report = evaluate(solved[0], truth)
         right = recording.detections.object_id == truth.box_object_id
         right_graph = graph if right.all() else right_graph_of(recording, right, believed)
-        bound = robust = None
-        if settings.bound:
-            bound = score_bound(graph, right_graph, truth, solved, options)
+        score = robust = None
+        if bound:
+            score = score_bound(graph, right_graph, truth, solved, options)
         if not right.all():
-            told = _without_loss(settings, sigma)
             robust = score_robust(right_graph, right, truth, solved[0], told)
-        return Outcome(report, seconds, bound=bound, robust=robust)
+        summary = solved[1]
+        return Outcome(
+            report,
+            seconds,
+            bound=score,
+            robust=robust,
+            iterations=summary.iterations,
+            converged=summary.converged,
+        )
     except Exception as error:  # whatever it was: counted, shown and never dropped
         seconds = time.perf_counter() - start if seconds is None else seconds
         return Outcome(None, seconds, f"{type(error).__name__}: {error}")
-
-
-def _without_loss(settings: Settings, sigma: float | None) -> SolveOptions:
-    return method_options(Settings(settings.method), sigma)
