@@ -46,7 +46,7 @@ def compare(a: Path, b: Path) -> str:
         if set(first) != set(second):
             raise SystemExit(f"{a} and {b} hold different arrays")
         largest = {name: np.abs(first[name] - second[name]).max() for name in first}
-    worst = max(largest, key=largest.__getitem__)
+    worst = max(largest, key=lambda name: np.nan_to_num(largest[name], nan=np.inf))
     text = f"largest difference of {len(largest)} arrays: {largest[worst]:.1e}, in {worst}"
     if not largest[worst] <= TOLERANCE:
         raise SystemExit(f"{text}, above {TOLERANCE:.0e}")
