@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 
@@ -20,6 +20,7 @@ class FileErrors(FileError):
 
     def __init__(self, errors: Sequence[FileError]) -> None:
         ValueError.__init__(self, "\n".join(map(str, errors)))
+        self.errors = tuple(errors)
 
 
 def read_text(path: str | Path) -> str:
@@ -38,13 +39,19 @@ def read_text(path: str | Path) -> str:
 
 
 def write_text(path: str | Path, parts: str | Iterable[str]) -> None:
-    """Write a file under a temporary name, then rename: readers never see half a file."""
+    """Write a text file, all of it or nothing."""
+    with whole_file(path) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as file:
+        file.writelines([parts] if isinstance(parts, str) else parts)
+
+
+@contextlib.contextmanager
+def whole_file(path: str | Path) -> Iterator[Path]:
+    """Give a temporary name that becomes ``path`` if all goes well: nobody sees half a file."""
     path = Path(path)
     temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with temporary.open("w", encoding="utf-8", newline="\n") as file:
-            file.writelines([parts] if isinstance(parts, str) else parts)
+        yield temporary
         temporary.replace(path)
     except OSError as error:
         raise FileError(path, f"cannot be written: {error.strerror}") from None

@@ -1,0 +1,98 @@
+"""``dqslam view``: look at a map, on a live page, a static page, in Rerun or MeshLab."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from dqslam.cli.output import Output, Quiet
+
+if TYPE_CHECKING:
+    from dqslam.view import Scene
+
+
+def view(
+    directory: Annotated[Path, typer.Argument(metavar="DIR", help="What `dqslam run` wrote.")],
+    groundtruth: Annotated[
+        Path | None,
+        typer.Option(help="True trajectory, in any world. Default: DIR/groundtruth.txt if any."),
+    ] = None,
+    objects: Annotated[
+        Path | None, typer.Option(help="CSV of true objects. Default: DIR/objects.csv if any.")
+    ] = None,
+    align: Annotated[
+        Literal["se3", "sim3", "se2", "none"],
+        typer.Option(help="Motion between both worlds: rigid, with scale, on the plane."),
+    ] = "se3",
+    export: Annotated[
+        Path | None,
+        typer.Option(metavar="PAGE", help="Write a folder that any web server shows, and stop."),
+    ] = None,
+    rerun: Annotated[
+        Path | None, typer.Option(metavar="FILE.rrd", help="Write a Rerun recording, and stop.")
+    ] = None,
+    ply: Annotated[
+        Path | None, typer.Option(metavar="FILE.ply", help="Write the map as PLY, and stop.")
+    ] = None,
+    host: Annotated[
+        str, typer.Option(help="Address of the live page; 0.0.0.0 lets other machines in.")
+    ] = "127.0.0.1",
+    port: Annotated[
+        int, typer.Option(min=1, max=65535, help="Its port, or the next one that is free.")
+    ] = 8080,
+    quiet: Quiet = False,
+) -> None:
+    """Show the map of DIR on a page: trajectory, cameras, objects, boxes, truth; Ctrl-C stops.
+
+    Needs `pip install 'dqslam[view]'`; --export and --ply do without, --rerun needs dqslam[rerun].
+    """
+    from dqslam import io
+    from dqslam.view import ESTIMATE, build_scene, rgb, write_page, write_rerun
+
+    output = Output(quiet=quiet)
+    results = io.load_results(directory)
+    groundtruth = groundtruth or _beside(directory / "groundtruth.txt")
+    objects = objects or (_beside(directory / "objects.csv") if groundtruth else None)
+    scene = build_scene(
+        results,
+        groundtruth=(
+            None if groundtruth is None else io.read_trajectory(groundtruth, repeated_times=True)
+        ),
+        objects=None if objects is None else io.read_true_objects(objects),
+        align=align,
+    )
+    if export is not None:
+        output.line(f"wrote {write_page(scene, export)}: open it, or serve the folder")
+    if rerun is not None:
+        with output.waiting("writing"):
+            write_rerun(scene, rerun)
+        output.line(f"wrote {rerun}")
+    if ply is not None:
+        io.write_ply(ply, results, [rgb(one.color) for one in scene.objects], rgb(ESTIMATE))
+        output.line(f"wrote {ply}")
+    if export is None and rerun is None and ply is None:
+        _serve(scene, host, port, output)
+
+
+def _beside(path: Path) -> Path | None:
+    return path if path.is_file() else None
+
+
+def _serve(scene: Scene, host: str, port: int, output: Output) -> None:
+    """Show a scene until Ctrl-C."""
+    from time import sleep
+
+    from dqslam.view import serve
+
+    server = serve(scene, host=host, port=port)
+    try:
+        name = "localhost" if host in ("127.0.0.1", "0.0.0.0", "::") else host
+        output.line(f"http://{name}:{server.get_port()} shows {scene.title}; Ctrl-C stops")
+        while True:
+            sleep(3600.0)
+    except KeyboardInterrupt:
+        output.line("stopped")
+    finally:
+        server.stop()

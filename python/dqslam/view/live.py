@@ -1,0 +1,241 @@
+"""A scene on a live page: viser serves it and answers clicks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dqslam._checks import Floats
+from dqslam.view.picture import draw_image
+from dqslam.view.scene import ESTIMATE, ODOMETRY, TRUTH, Scene, SceneObject, rgb
+
+if TYPE_CHECKING:
+    from viser import ViserServer
+
+_CAMERAS = 60  # drawn at most
+_NOTHING = "nothing"
+
+
+def serve(scene: Scene, *, host: str = "127.0.0.1", port: int = 8080) -> ViserServer:
+    """Serve a scene until the server that is returned is stopped; needs ``dqslam[view]``.
+
+    Where the port is taken it is the next free one: ``server.get_port()``.
+    """
+    try:
+        import viser
+    except ModuleNotFoundError:
+        raise RuntimeError(
+            "the live page needs viser: pip install 'dqslam[view]' (--export does without)"
+        ) from None
+    server = viser.ViserServer(host=host, port=port, label=scene.title, verbose=False)
+    _Page(server, scene)
+    return server
+
+
+class _Page:
+    """What is on the page, and what it does when something is clicked."""
+
+    def __init__(self, server: ViserServer, scene: Scene) -> None:
+        self.server, self.scene = server, scene
+        self.frame = 0
+        self.selected: int | None = None
+        self.radius = _place_eye(server, scene)
+        parents = {
+            "estimate": self._path("estimate", scene.estimate, ESTIMATE),
+            "odometry": self._path("odometry", scene.odometry, ODOMETRY),
+        }
+        if scene.truth is not None:
+            parents["truth"] = self._group("truth")
+            self._path("truth/path", scene.truth, TRUTH)
+            for row, one in enumerate(scene.true_objects):
+                _ellipsoid(server, f"/truth/objects/{row}", one, TRUTH, wireframe=True, opacity=0.5)
+        parents["cameras"] = self._cameras()
+        parents["objects"] = self._objects()
+        parents["names"] = self._names()
+        if any(one.center_covariance is not None for one in scene.objects):
+            parents["covariance"] = self._covariances()
+        self._controls(parents)
+        self._show()
+
+    def _group(self, name: str) -> Any:
+        return self.server.scene.add_frame(f"/{name}", show_axes=False)
+
+    def _path(self, name: str, poses: Floats, color: str) -> Any:
+        points = poses[:, :3]
+        segments = np.stack([points[:-1], points[1:]], axis=1)
+        return self.server.scene.add_line_segments(
+            f"/{name}", segments, rgb(color), thickness=3.0, thickness_units="screen"
+        )
+
+    def _cameras(self) -> Any:
+        group = self._group("cameras")
+        camera, size = self.scene.camera, 0.022 * self.radius
+        shape: dict[str, Any] = {
+            "fov": 2.0 * float(np.arctan(0.5 * camera.height / camera.fy)),
+            "aspect": camera.width * camera.fy / (camera.height * camera.fx),
+            "thickness_units": "screen",
+        }
+        step = -(-len(self.scene.estimate) // _CAMERAS)
+        for row in range(0, len(self.scene.estimate), step):
+            self.server.scene.add_camera_frustum(
+                f"/cameras/{row}",
+                **shape,
+                scale=size,
+                thickness=1.0,
+                color=(125, 136, 148),
+                **_placed(self.scene.estimate[row]),
+            )
+        self.camera = self.server.scene.add_camera_frustum(
+            "/cameras/current", **shape, scale=2.5 * size, thickness=2.5, color=(20, 20, 20)
+        )
+        return group
+
+    def _objects(self) -> Any:
+        group = self._group("objects")
+        self.nodes = {}
+        for row, one in enumerate(self.scene.objects):
+            node = _ellipsoid(self.server, f"/objects/{row}", one, one.color, opacity=0.85)
+            if node is not None:
+                node.on_click(self._on_click(row))
+                self.nodes[row] = node
+        return group
+
+    def _on_click(self, row: int) -> Callable[[Any], None]:
+        return lambda _: self._select(row)
+
+    def _names(self) -> Any:
+        group = self._group("names")
+        for row, one in enumerate(self.scene.objects):
+            above = 0.0 if one.semi_axes is None else one.semi_axes.max()
+            self.server.scene.add_label(
+                f"/names/{row}",
+                _name(one),
+                position=one.center + above * self.scene.up,
+                anchor="bottom-center",
+                font_screen_scale=0.8,
+            )
+        return group
+
+    def _covariances(self) -> Any:
+        group = self._group("covariance")
+        group.visible = False
+        for row, one in enumerate(self.scene.objects):
+            if one.spread is not None:
+                _ellipsoid(self.server, f"/covariance/{row}", one.spread, "#111111", opacity=0.5)
+        return group
+
+    def _controls(self, parents: dict[str, Any]) -> None:
+        gui = self.server.gui
+        last = len(self.scene.timestamps) - 1
+        self.slider = gui.add_slider("image", min=0, max=max(last, 1), step=1, initial_value=0)
+        self.slider.on_update(lambda _: self._go(min(int(self.slider.value), last)))
+        self.picture = gui.add_html("")
+        names = [_NOTHING, *(_name(one) for one in self.scene.objects)]
+        self.choice: Any = gui.add_dropdown("object", names, initial_value=_NOTHING)
+        self.choice.on_update(lambda _: self._choose(names.index(self.choice.value) - 1))
+        self.numbers = gui.add_html("")
+        with gui.add_folder("show"):
+            for name, node in parents.items():
+                box = gui.add_checkbox(name, initial_value=node.visible)
+                box.on_update(_switch(node, box))
+        with gui.add_folder("all"):
+            gui.add_html(_table(self.scene.overview))
+
+    def _go(self, frame: int) -> None:
+        self.frame = frame
+        self._show()
+
+    def _select(self, row: int) -> None:
+        self.choice.value = _name(self.scene.objects[row])  # which calls _choose
+
+    def _choose(self, row: int) -> None:
+        for each, node in self.nodes.items():
+            node.opacity = 1.0 if each == row else 0.85 if row < 0 else 0.45
+        self.selected = None if row < 0 else row
+        self._show()
+
+    def _show(self) -> None:
+        placed = _placed(self.scene.estimate[self.frame])
+        with self.server.atomic():
+            self.camera.position, self.camera.wxyz = placed["position"], placed["wxyz"]
+            time = f"{self.scene.timestamps[self.frame]:.3f} s"
+            picture = draw_image(self.scene, self.frame, self.selected)
+            self.picture.content = f'<div style="padding:0 1em">{picture}{time}</div>'
+            chosen = None if self.selected is None else self.scene.objects[self.selected]
+            self.numbers.content = "" if chosen is None else _table(chosen.numbers)
+
+
+def _place_eye(server: ViserServer, scene: Scene) -> float:
+    """Look at the whole path from above and beside it; return how far it reaches, metres."""
+    points = scene.estimate[:, :3]
+    low, high = points.min(axis=0), points.max(axis=0)
+    if scene.objects:
+        # Not the few that lie far away: all else would be a dot.
+        centers = np.array([one.center for one in scene.objects])
+        low = np.minimum(low, np.quantile(centers, 0.1, axis=0))
+        high = np.maximum(high, np.quantile(centers, 0.9, axis=0))
+    radius = max(0.5 * float(np.linalg.norm(high - low)), 1e-3)
+    middle = 0.5 * (low + high)
+    along = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2][0]
+    beside = np.cross(along, scene.up)
+    length = float(np.linalg.norm(beside))
+    beside = beside / length if length > 1e-6 else np.roll(scene.up, 1)
+    server.scene.set_up_direction(scene.up)
+    server.scene.world_axes.visible = False
+    eye = server.initial_camera
+    eye.position = middle + radius * (1.3 * beside + 0.9 * scene.up)
+    eye.look_at = middle
+    eye.near, eye.far = 0.002 * radius, 100.0 * radius
+    return radius
+
+
+def _ellipsoid(
+    server: ViserServer,
+    name: str,
+    one: SceneObject,
+    color: str,
+    *,
+    opacity: float,
+    wireframe: bool = False,
+) -> Any:
+    """Add an object; None where it is no ellipsoid."""
+    if one.semi_axes is None or one.orientation_xyzw is None:
+        return None
+    return server.scene.add_icosphere(
+        name,
+        radius=1.0,
+        color=rgb(color),
+        scale=(float(one.semi_axes[0]), float(one.semi_axes[1]), float(one.semi_axes[2])),
+        wireframe=wireframe,
+        opacity=opacity,
+        subdivisions=2 if wireframe else 4,
+        **_placed(np.concatenate([one.center, one.orientation_xyzw])),
+    )
+
+
+def _placed(pose: Floats) -> dict[str, Any]:
+    """Return viser's way to say where something is, of [tx ty tz qx qy qz qw]."""
+    return {"position": pose[:3], "wxyz": pose[[6, 3, 4, 5]]}
+
+
+def _switch(node: Any, box: Any) -> Callable[[Any], None]:
+    def update(_: Any) -> None:
+        node.visible = box.value
+
+    return update
+
+
+def _name(one: SceneObject) -> str:
+    return f"{one.class_name} {one.id}"
+
+
+def _table(numbers: tuple[tuple[str, str], ...]) -> str:
+    rows = "".join(
+        f'<tr><td style="color:#777">{escape(name)}</td>'
+        f'<td style="text-align:right">{escape(value)}</td></tr>'
+        for name, value in numbers
+    )
+    return f'<table style="width:100%;padding:0 1em;font-size:0.85em">{rows}</table>'

@@ -1,0 +1,105 @@
+"""What is known of an estimate and its objects, in words: pairs of what it is and how much."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from dqslam._checks import Floats
+from dqslam.evaluate_results import box_overlaps
+from dqslam.io import Results, TrueObjects
+
+Numbers = tuple[tuple[str, str], ...]
+
+
+def overview(results: Results, evaluation: Mapping[str, Any]) -> Numbers:
+    """Describe the whole; ``evaluation`` is that of ``evaluate_results``, empty without truth."""
+    path = np.linalg.norm(np.diff(results.world_from_camera[:, :3], axis=0), axis=1).sum()
+    shown = [
+        ("poses", f"{len(results.timestamps)} over {path:.4g} m"),
+        ("objects", f"{len(results.objects)} mapped, {len(results.objects.dropped)} not"),
+    ]
+    if results.boxes is not None:
+        shown.append(("boxes", str(len(results.boxes))))
+    if not evaluation:
+        return tuple(shown)
+    shown += [
+        ("position error, rmse", _metres(evaluation["ate"]["rmse"])),
+        ("odometry's", _metres(evaluation["odometry_ate"]["rmse"])),
+    ]
+    objects = evaluation["objects"]
+    if objects is not None:
+        found = f"{objects['matched']} found, {objects['missed']} missed"
+        shown.append(("true objects at rest", found))
+    return tuple(shown)
+
+
+def object_numbers(results: Results, evaluation: Mapping[str, Any]) -> list[Numbers]:
+    """Describe each mapped object; with the truth, how far it is off."""
+    objects, boxes = results.objects, results.boxes
+    overlap = None if boxes is None else box_overlaps(results, boxes)
+    judged = evaluation.get("objects")
+    pairs = {pair["id"]: pair for pair in judged["pairs"]} if judged else {}
+    described = []
+    for row in range(len(objects)):
+        shown = [("centre", f"{_vector(objects.center[row])} m")]
+        covariance = objects.center_covariance[row]
+        if np.isfinite(covariance).all():
+            shown.append(("σ of centre", _lengths(np.sqrt(np.diag(covariance)))))
+        if objects.is_ellipsoid[row]:
+            shown.append(("size", _lengths(2.0 * objects.semi_axes[row])))
+        if np.isfinite(objects.log_semi_axes_sigma[row]).all():
+            sigma = " × ".join(f"{100.0 * s:.2g} %" for s in objects.log_semi_axes_sigma[row])
+            shown.append(("σ of size", sigma))
+        if boxes is not None and overlap is not None:
+            mine = boxes.object_id == objects.id[row]
+            shown.append(("boxes", f"{mine.sum()}, {(mine & boxes.inlier).sum()} fit"))
+            known = overlap[mine & np.isfinite(overlap)]
+            if len(known):
+                shown.append(("IoU of boxes, median", f"{np.median(known):.3f}"))
+        described.append((*shown, *_errors(pairs.get(int(objects.id[row])), bool(judged))))
+    return described
+
+
+def true_object_numbers(true: TrueObjects, row: int) -> Numbers:
+    """Describe one object of the truth, in the truth's own world."""
+    shown = [("true centre", f"{_vector(true.center[row])} m")]
+    if true.size is not None:
+        shown.append(("true size", _lengths(true.size[row])))
+    if not true.static[row]:
+        shown.append(("at rest", "no, it moves"))
+    return tuple(shown)
+
+
+def _errors(pair: Mapping[str, Any] | None, judged: bool) -> Numbers:
+    if pair is None:
+        return (("truth", "no object like it"),) if judged else ()
+    shown = [("centre is off by", _metres(pair["center"]))]
+    if pair["true_id"] is not None:
+        shown.insert(0, ("true id", str(pair["true_id"])))
+    for title, key, form in (
+        ("size is off by", "size_relative", "{:.0%}"),
+        ("volume, over the true", "volume_ratio", "{:.2f}"),
+        ("turned by", "orientation_deg", "{:.1f}°"),
+        ("IoU in space", "iou_3d", "{:.2f}"),
+    ):
+        if pair[key] is not None:
+            shown.append((title, form.format(pair[key])))
+    return tuple(shown)
+
+
+def _vector(values: Floats) -> str:
+    return " ".join(f"{value:.3f}" for value in values)
+
+
+def _lengths(values: Floats) -> str:
+    """Write lengths side by side, in millimetres where none reaches 0.1 m."""
+    if values.max() < 0.1:
+        return " × ".join(f"{1e3 * value:.2g}" for value in values) + " mm"
+    return " × ".join(f"{value:.3f}" for value in values) + " m"
+
+
+def _metres(value: float) -> str:
+    return f"{value:.3g} m"

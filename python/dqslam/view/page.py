@@ -1,0 +1,78 @@
+"""A scene as a folder of a page that any web server shows, and a browser without one.
+
+The page is our own few hundred lines without any library: viser's static export holds the scene but
+neither slider nor click, and a 3D library would be a hundred times as large as what it is needed
+for. Nothing is fetched from elsewhere.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dqslam._checks import Floats
+from dqslam.io.files import write_text
+from dqslam.view.scene import ESTIMATE, ODOMETRY, TRUTH, Scene, SceneObject
+
+_STATIC = Path(__file__).with_name("static")
+# Micrometres and microradians: more would only make the file larger.
+_DECIMALS = 6
+
+
+def write_page(scene: Scene, directory: str | Path) -> Path:
+    """Write the page into a directory, which is made if need be, and return its ``index.html``."""
+    directory = Path(directory)
+    directory.mkdir(parents=True, exist_ok=True)
+    for source in sorted(_STATIC.iterdir()):
+        shutil.copyfile(source, directory / source.name)
+    # As a script, not as JSON: a browser that opens the folder itself may not fetch files.
+    text = json.dumps(_describe(scene), separators=(",", ":"), allow_nan=False)
+    write_text(directory / "scene.js", f"const scene = {text};\n")
+    return directory / "index.html"
+
+
+def _describe(scene: Scene) -> dict[str, Any]:
+    boxes = scene.boxes
+    names = ("fx", "fy", "cx", "cy", "width", "height")
+    return {
+        "title": scene.title,
+        "up": _rounded(scene.up),
+        "colors": {"estimate": ESTIMATE, "odometry": ODOMETRY, "truth": TRUTH},
+        "camera": {name: getattr(scene.camera, name) for name in names},
+        "timestamps": scene.timestamps.tolist(),
+        "estimate": _rounded(scene.estimate),
+        "odometry": _rounded(scene.odometry),
+        "truth": None if scene.truth is None else _rounded(scene.truth),
+        "objects": [_object(one) for one in scene.objects],
+        "trueObjects": [_object(one) for one in scene.true_objects],
+        "boxes": {
+            "pose": boxes.pose.tolist(),
+            "box": np.round(boxes.box, 2).tolist(),
+            "object": boxes.object.tolist(),
+            "className": list(boxes.class_name),
+            "state": list(boxes.state),
+        },
+        "overview": scene.overview,
+    }
+
+
+def _object(one: SceneObject) -> dict[str, Any]:
+    covariance = one.center_covariance
+    return {
+        "id": one.id,
+        "className": one.class_name,
+        "color": one.color,
+        "center": _rounded(one.center),
+        "semiAxes": None if one.semi_axes is None else _rounded(one.semi_axes),
+        "orientation": None if one.orientation_xyzw is None else _rounded(one.orientation_xyzw),
+        "centerCovariance": None if covariance is None else covariance.tolist(),
+        "numbers": one.numbers,
+    }
+
+
+def _rounded(values: Floats) -> Any:
+    return np.round(values, _DECIMALS).tolist()

@@ -1,0 +1,129 @@
+"""A scene as a recording for the Rerun viewer."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dqslam._checks import Floats
+from dqslam._files import whole_file
+from dqslam.view.picture import outlines_in_image
+from dqslam.view.scene import ESTIMATE, ODOMETRY, TRUTH, Scene, SceneObject, rgb
+
+if TYPE_CHECKING:
+    from rerun import RecordingStream
+
+
+def write_rerun(scene: Scene, path: str | Path) -> None:
+    """Write an ``.rrd`` file; needs ``dqslam[rerun]``.
+
+    ``world/``: ``estimate``, ``odometry``, ``truth``, ``objects``, ``covariance``, ``true_objects``
+    once and for all; on the timelines ``time`` [s] and ``image`` the ``camera``, and in its image
+    ``boxes`` and ``outlines``.
+    """
+    try:
+        import rerun
+    except ModuleNotFoundError:
+        raise RuntimeError("--rerun needs rerun-sdk: pip install 'dqslam[rerun]'") from None
+    with whole_file(path) as temporary:
+        stream = rerun.RecordingStream("dqslam", recording_id=scene.title)
+        stream.save(temporary)
+        stream.send_recording_name(scene.title)
+        _log_world(stream, scene)
+        for frame in range(len(scene.timestamps)):
+            _log_frame(stream, scene, frame)
+        stream.disconnect()  # which writes what is left
+
+
+def _log_world(stream: RecordingStream, scene: Scene) -> None:
+    import rerun
+
+    paths = (
+        ("estimate", scene.estimate, ESTIMATE),
+        ("odometry", scene.odometry, ODOMETRY),
+        ("truth", scene.truth, TRUTH),
+    )
+    for name, poses, color in paths:
+        if poses is not None:
+            strip = rerun.LineStrips3D([poses[:, :3]], colors=[rgb(color)])
+            stream.log(f"world/{name}", strip, static=True)
+    _log_objects(stream, "objects", list(scene.objects), [one.color for one in scene.objects])
+    true = list(scene.true_objects)
+    _log_objects(stream, "true_objects", true, [TRUTH for _ in true], labels=False)
+    spreads = [one.spread for one in scene.objects if one.spread is not None]
+    _log_objects(stream, "covariance", spreads, ["#111111" for _ in spreads], labels=False)
+    camera = scene.camera
+    pinhole = rerun.Pinhole(
+        focal_length=[camera.fx, camera.fy],
+        # Rerun counts from the corner of the image.
+        principal_point=[camera.cx + 0.5, camera.cy + 0.5],
+        resolution=[camera.width, camera.height],
+        camera_xyz=rerun.ViewCoordinates.RDF,
+    )
+    stream.log("world/camera", pinhole, static=True)
+
+
+def _log_objects(
+    stream: RecordingStream,
+    name: str,
+    objects: list[SceneObject],
+    colors: list[str],
+    *,
+    labels: bool = True,
+) -> None:
+    """Log ellipsoids, and as points what is none."""
+    import rerun
+
+    bodies = [k for k, one in enumerate(objects) if one.semi_axes is not None]
+    points = [k for k, one in enumerate(objects) if one.semi_axes is None]
+    if bodies:
+        shown: dict[str, Any] = {
+            "centers": [objects[k].center for k in bodies],
+            "half_sizes": [objects[k].semi_axes for k in bodies],
+            "quaternions": [objects[k].orientation_xyzw for k in bodies],
+            "colors": [rgb(colors[k]) for k in bodies],
+        }
+        if labels:
+            shown["labels"] = [f"{objects[k].class_name} {objects[k].id}" for k in bodies]
+        stream.log(f"world/{name}", rerun.Ellipsoids3D(**shown), static=True)
+    if points:
+        centers = [objects[k].center for k in points]
+        dots = rerun.Points3D(centers, colors=[rgb(colors[k]) for k in points])
+        stream.log(f"world/{name}/points", dots, static=True)
+
+
+def _log_frame(stream: RecordingStream, scene: Scene, frame: int) -> None:
+    import rerun
+
+    stream.set_time("time", duration=float(scene.timestamps[frame]))
+    stream.set_time("image", sequence=frame)
+    pose = scene.estimate[frame]
+    stream.log("world/camera", rerun.Transform3D(translation=pose[:3], quaternion=pose[3:]))
+    boxes = scene.boxes
+    shown = np.flatnonzero(boxes.pose == frame)
+    colors = [_box_color(scene, int(row)) for row in shown]
+    labels = [boxes.class_name[row] for row in shown]
+    drawn = rerun.Boxes2D(
+        array=_from_corner(boxes.box[shown]),
+        array_format=rerun.Box2DFormat.XYXY,
+        colors=colors,
+        labels=labels,
+    )
+    stream.log("world/camera/boxes", drawn)
+    rows, outlines = outlines_in_image(scene, frame)
+    strips = rerun.LineStrips2D(
+        list(_from_corner(outlines)), colors=[rgb(scene.objects[row].color) for row in rows]
+    )
+    stream.log("world/camera/outlines", strips)
+
+
+def _box_color(scene: Scene, row: int) -> tuple[int, int, int]:
+    of = int(scene.boxes.object[row])
+    return (150, 150, 150) if of < 0 else rgb(scene.objects[of].color)
+
+
+def _from_corner(pixels: Floats) -> Floats:
+    """Return pixels counted from the corner of the image, as Rerun does, not from a centre."""
+    return pixels + 0.5

@@ -1,0 +1,284 @@
+"""What there is to see, as plain data: every viewer shows this, none computes it.
+
+The world is that of the estimate, metres; the truth is moved into it. Poses are world_from_camera,
+[tx ty tz qx qy qz qw], boxes [u_min, v_min, u_max, v_max] in undistorted pixels.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from dqslam import _core
+from dqslam._checks import Floats, Ints
+from dqslam.evaluate import Align, Alignment
+from dqslam.evaluate_results import common_poses, evaluate_results
+from dqslam.io import BoxTable, MapObjects, Results, Trajectory, TrueObjects
+from dqslam.view.numbers import Numbers, object_numbers, overview, true_object_numbers
+
+# Okabe and Ito's, then Tol's: hues that the colour-blind can tell apart.
+ODOMETRY, TRUTH, ESTIMATE = "#0072B2", "#009E73", "#D55E00"
+CLASSES = ("#E69F00", "#56B4E9", "#CC79A7", "#882255", "#999933", "#332288", "#44AA99", "#AA4499")
+# An axis of the world that is as near to what seems up, radians, is up.
+NEAR_AXIS = np.radians(15.0)
+MEAN_UP_WEIGHT = 0.02
+# Of the centre, shown where covariances are.
+SIGMAS = 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class SceneObject:
+    """One object of the map or of the truth."""
+
+    id: int
+    """-1 for a true object without one."""
+    class_name: str
+    color: str
+    """``#rrggbb``, one a class."""
+    center: Floats
+    """Metres, shape (3,)."""
+    semi_axes: Floats | None
+    """Metres, shape (3,); None where it is no ellipsoid, or its size is unknown."""
+    orientation_xyzw: Floats | None
+    """world_from_object, shape (4,); None with ``semi_axes``."""
+    center_covariance: Floats | None
+    """Square metres, shape (3, 3); None where unknown."""
+    numbers: Numbers
+    """What is known of it, in words."""
+
+    @property
+    def ellipsoid(self) -> Floats | None:
+        """Centre and log-Cholesky shape, shape (9,)."""
+        if self.semi_axes is None or self.orientation_xyzw is None:
+            return None
+        return _core.ellipsoid_from_axes(self.center, self.semi_axes, self.orientation_xyzw)
+
+    @property
+    def spread(self) -> SceneObject | None:
+        """The ellipsoid of ``SIGMAS`` standard deviations of the centre."""
+        from scipy.spatial.transform import Rotation
+
+        if self.center_covariance is None:
+            return None
+        squares, axes = np.linalg.eigh(self.center_covariance)
+        axes[:, 0] *= np.linalg.det(axes)  # a rotation, not a reflection
+        return replace(
+            self,
+            semi_axes=SIGMAS * np.sqrt(squares.clip(min=1e-18)),
+            orientation_xyzw=Rotation.from_matrix(axes).as_quat(),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class SceneBoxes:
+    """All boxes, in the order of their poses."""
+
+    pose: Ints
+    """Row of the pose it was seen from, shape (m,)."""
+    box: Floats
+    """Shape (m, 4)."""
+    object: Ints
+    """Row of the mapped object it was taken for, -1 for none; shape (m,)."""
+    class_name: tuple[str, ...]
+    """One per box."""
+    state: tuple[str, ...]
+    """``fits``, ``misfit`` (an outlier), ``held out`` or ``left out`` (of no mapped object)."""
+
+    def __len__(self) -> int:
+        """Return the number of boxes."""
+        return len(self.pose)
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """All that a viewer shows."""
+
+    title: str
+    up: Floats
+    """Unit vector away from the ground, shape (3,)."""
+    camera: _core.Camera
+    timestamps: Floats
+    """Seconds, shape (n,)."""
+    estimate: Floats
+    """Shape (n, 7)."""
+    odometry: Floats
+    """Shape (n, 7)."""
+    truth: Floats | None
+    """True poses at the times that have one, shape (t, 7), t <= n."""
+    objects: tuple[SceneObject, ...]
+    true_objects: tuple[SceneObject, ...]
+    boxes: SceneBoxes
+    overview: Numbers
+    """What is known of the whole, in words."""
+
+
+def rgb(color: str) -> tuple[int, int, int]:
+    """Return red, green and blue, 0 to 255, of ``#rrggbb``."""
+    red, green, blue = bytes.fromhex(color[1:])
+    return red, green, blue
+
+
+def build_scene(
+    results: Results,
+    *,
+    groundtruth: Trajectory | None = None,
+    objects: TrueObjects | None = None,
+    align: Align = "se3",
+) -> Scene:
+    """Return what there is to see of an estimate.
+
+    Parameters
+    ----------
+    groundtruth, objects
+        The true trajectory and objects, in any world: ``evaluate_results`` finds where that lies.
+    align
+        The kind of motion between both worlds, see ``evaluate.align_positions``.
+
+    Raises
+    ------
+    ValueError
+        For true objects without a true trajectory, and where the latter meets no pose.
+    """
+    if objects is not None and groundtruth is None:
+        raise ValueError(f"{objects.path}: where true objects lie, only a true trajectory can tell")
+    evaluation: dict[str, Any] = {}
+    truth = None
+    true_objects: tuple[SceneObject, ...] = ()
+    colors = _class_colors(results.objects, objects)
+    if groundtruth is not None:
+        evaluation = evaluate_results(results, groundtruth, align=align, objects=objects)
+        estimated_from_true = _inverse(evaluation["true_from_estimated"])
+        _, rows = common_poses(results.timestamps, groundtruth)
+        truth = estimated_from_true.apply_poses(groundtruth.world_from_camera[rows])
+        if objects is not None:
+            true_objects = _true_objects(objects, estimated_from_true, colors)
+    return Scene(
+        title=results.directory.resolve().name,
+        up=_find_up(results.world_from_camera),
+        camera=results.camera,
+        timestamps=results.timestamps,
+        estimate=results.world_from_camera,
+        odometry=results.odometry,
+        truth=truth,
+        objects=_mapped_objects(results, evaluation, colors),
+        true_objects=true_objects,
+        boxes=_boxes(results.boxes, results.objects),
+        overview=overview(results, evaluation),
+    )
+
+
+def _inverse(true_from_estimated: Mapping[str, Any]) -> Alignment:
+    from scipy.spatial.transform import Rotation
+
+    scale = true_from_estimated["scale"]
+    rotation = Rotation.from_quat(true_from_estimated["rotation_xyzw"]).as_matrix().T
+    return Alignment(rotation, -rotation @ true_from_estimated["translation"] / scale, 1.0 / scale)
+
+
+def _class_colors(mapped: MapObjects, true: TrueObjects | None) -> dict[str, str]:
+    """Return the colour of each class, those of the map first; more classes than colours share."""
+    names = sorted(set(mapped.class_name))
+    names += sorted(set(true.class_name or () if true else ()) - set(names))
+    return {name: CLASSES[k % len(CLASSES)] for k, name in enumerate(names)}
+
+
+def _mapped_objects(
+    results: Results, evaluation: Mapping[str, Any], colors: Mapping[str, str]
+) -> tuple[SceneObject, ...]:
+    mapped = results.objects
+    numbers = object_numbers(results, evaluation)
+    return tuple(
+        SceneObject(
+            id=int(mapped.id[row]),
+            class_name=mapped.class_name[row],
+            color=colors[mapped.class_name[row]],
+            center=mapped.center[row],
+            semi_axes=_known(mapped.semi_axes[row]),
+            orientation_xyzw=_known(mapped.orientation_xyzw[row]),
+            center_covariance=_known(mapped.center_covariance[row]),
+            numbers=numbers[row],
+        )
+        for row in range(len(mapped))
+    )
+
+
+def _true_objects(
+    true: TrueObjects, estimated_from_true: Alignment, colors: Mapping[str, str]
+) -> tuple[SceneObject, ...]:
+    from scipy.spatial.transform import Rotation
+
+    centers = estimated_from_true.apply(true.center)
+    semi_axes = orientations = None
+    if true.size is not None and true.rotation is not None:
+        semi_axes = 0.5 * estimated_from_true.scale * true.size
+        rotations = estimated_from_true.rotation @ true.rotation
+        orientations = Rotation.from_matrix(rotations).as_quat()
+    shown = []
+    for row in range(len(true)):
+        name = "" if true.class_name is None else true.class_name[row]
+        shown.append(
+            SceneObject(
+                id=-1 if true.id is None else int(true.id[row]),
+                class_name=name,
+                color=colors.get(name, TRUTH),
+                center=centers[row],
+                semi_axes=None if semi_axes is None else semi_axes[row],
+                orientation_xyzw=None if orientations is None else orientations[row],
+                center_covariance=None,
+                numbers=true_object_numbers(true, row),
+            )
+        )
+    return tuple(shown)
+
+
+def _known(values: Floats) -> Floats | None:
+    return values if np.isfinite(values).all() else None
+
+
+def _boxes(boxes: BoxTable | None, mapped: MapObjects) -> SceneBoxes:
+    if boxes is None:
+        none = np.zeros(0, dtype=np.int64)
+        return SceneBoxes(none, np.zeros((0, 4)), none, (), ())
+    row_of = {int(number): row for row, number in enumerate(mapped.id)}
+    order = np.argsort(boxes.pose, kind="stable")
+    mapped_row = np.array([row_of.get(int(boxes.object_id[row]), -1) for row in order], dtype=int)
+    states = []
+    for row, known in zip(order, mapped_row >= 0, strict=True):
+        if not known:
+            states.append("left out")
+        elif boxes.held_out[row]:
+            states.append("held out")
+        else:
+            states.append("fits" if boxes.inlier[row] else "misfit")
+    return SceneBoxes(
+        pose=boxes.pose[order],
+        box=boxes.box[order],
+        object=mapped_row,
+        class_name=tuple(boxes.class_name[row] for row in order),
+        state=tuple(states),
+    )
+
+
+def _find_up(poses: Floats) -> Floats:
+    """Return the direction that is up, shape (3,), or the axis of the world near it.
+
+    Files do not say it, but cameras are held without roll on the whole: their x axes are level, so
+    that up is the direction that these do not span. Where all look the same way that leaves the
+    pitch open, and up is the mean of the cameras' own up, which otherwise counts little.
+    """
+    from scipy.spatial.transform import Rotation
+
+    axes = Rotation.from_quat(poses[:, 3:]).as_matrix()
+    right, mean = axes[:, :, 0], -axes[:, :, 1].mean(axis=0)
+    level = right.T @ right / len(poses) - MEAN_UP_WEIGHT * np.outer(mean, mean)
+    up = np.linalg.eigh(level)[1][:, 0]
+    up = up if up @ mean >= 0.0 else -up
+    axis = int(np.argmax(np.abs(up)))
+    if abs(up[axis]) < np.cos(NEAR_AXIS):
+        return np.asarray(up)
+    nearest = np.zeros(3)
+    nearest[axis] = np.sign(up[axis])
+    return nearest

@@ -1,0 +1,91 @@
+// The image plane: the boxes of one image, and the outlines of the objects as they should be seen.
+"use strict";
+
+class ImageView {
+  /** `shapes` are those of the objects, null where one is no ellipsoid. */
+  constructor(canvas, scene, shapes, onPick) {
+    Object.assign(this, { canvas, scene, shapes });
+    this.rows = scene.timestamps.map(() => []);
+    scene.boxes.pose.forEach((pose, row) => this.rows[pose].push(row));
+    canvas.style.aspectRatio = `${scene.camera.width} / ${scene.camera.height}`;
+    canvas.addEventListener("click", (event) => onPick(this.pick(event.offsetX, event.offsetY)));
+    this.outlines = [];
+  }
+
+  /** Draw an image; returns how many boxes, and how many objects are in it. */
+  draw(frame, selected) {
+    const { camera, boxes } = this.scene;
+    const ratio = window.devicePixelRatio || 1;
+    this.scale = this.canvas.clientWidth / camera.width;
+    this.canvas.width = Math.round(this.canvas.clientWidth * ratio);
+    this.canvas.height = Math.round(this.canvas.clientHeight * ratio);
+    const context = this.canvas.getContext("2d");
+    // Whole numbers are centres of pixels, hence the border is half a pixel before them.
+    context.setTransform(ratio * this.scale, 0, 0, ratio * this.scale,
+      ratio * this.scale / 2, ratio * this.scale / 2);
+    const rows = this.rows[frame];
+    const seen = new Set(rows.map((row) => boxes.object[row]));
+    this.outlines = this.outlinesIn(frame);
+    for (const { row, outline } of this.outlines) {
+      this.drawOutline(context, outline, this.scene.objects[row].color, seen.has(row), row === selected);
+    }
+    for (const row of rows) this.drawBox(context, row, selected);
+    return { boxes: rows.length, outlines: this.outlines.length };
+  }
+
+  /** Outlines of all objects that are in front of the camera and meet the image. */
+  outlinesIn(frame) {
+    const { camera, estimate, objects } = this.scene;
+    const view = geometry.viewOf(estimate[frame]);
+    const found = [];
+    objects.forEach((object, row) => {
+      const outline = this.shapes[row] &&
+        geometry.outlineOf(view, camera, object.center, this.shapes[row]);
+      if (!outline) return;
+      const inside = outline.u + outline.halfWidth > 0 && outline.u - outline.halfWidth < camera.width
+        && outline.v + outline.halfHeight > 0 && outline.v - outline.halfHeight < camera.height;
+      if (inside) found.push({ row, outline });
+    });
+    return found.sort((a, b) => b.outline.depth - a.outline.depth);
+  }
+
+  drawOutline(context, outline, color, seen, isSelected) {
+    context.beginPath();
+    context.ellipse(outline.u, outline.v, outline.long, outline.short, outline.angle, 0, 2 * Math.PI);
+    context.setLineDash([]);
+    context.globalAlpha = seen ? 1 : 0.35;
+    context.fillStyle = color + (isSelected ? "66" : "2b");
+    if (seen || isSelected) context.fill();
+    context.lineWidth = (isSelected ? 2.5 : 1.4) / this.scale;
+    context.strokeStyle = color;
+    context.stroke();
+    context.globalAlpha = 1;
+  }
+
+  drawBox(context, row, selected) {
+    const { boxes, objects } = this.scene;
+    const [left, top, right, bottom] = boxes.box[row];
+    const object = boxes.object[row], state = boxes.state[row];
+    const pixel = 1 / this.scale;
+    const dashes = { fits: [], misfit: [6, 4], "held out": [1.5, 3], "left out": [] };
+    context.setLineDash(dashes[state].map((dash) => dash * pixel));
+    context.lineWidth = (state === "left out" ? 0.8 : object === selected && object >= 0 ? 3 : 1.8) * pixel;
+    context.strokeStyle = object >= 0 ? objects[object].color : "#999";
+    context.strokeRect(left, top, right - left, bottom - top);
+    context.setLineDash([]);
+    context.font = `${10 * pixel}px system-ui, sans-serif`;
+    context.lineWidth = 3 * pixel;
+    context.strokeStyle = "#ffffffd0";
+    context.fillStyle = object >= 0 ? "#222" : "#888";
+    const height = Math.max(top - 3 * pixel, 10 * pixel);
+    context.strokeText(boxes.className[row], left, height);
+    context.fillText(boxes.className[row], left, height);
+  }
+
+  /** The nearest object at a place of the canvas, CSS pixels; -1 for none. */
+  pick(x, y) {
+    const u = x / this.scale - 0.5, v = y / this.scale - 0.5;
+    const hit = this.outlines.filter(({ outline }) => geometry.contains(outline, u, v, 2));
+    return hit.length ? hit[hit.length - 1].row : -1;
+  }
+}

@@ -1,0 +1,293 @@
+// The map in space, painted from far to near on a plain canvas: an ellipsoid is seen as an ellipse,
+// whose equation is that of its dual conic, so that neither meshes nor a graphics card are needed.
+"use strict";
+
+const CIRCLE = Array.from({ length: 49 }, (_, k) => [Math.cos(k * Math.PI / 24), Math.sin(k * Math.PI / 24)]);
+const SIGMAS = 3;
+
+class SpaceView {
+  /** `shapes` and `trueShapes` are those of the objects, null where one is no ellipsoid. */
+  constructor(canvas, scene, shapes, trueShapes, { onPick, onChange }) {
+    Object.assign(this, { canvas, scene, shapes, trueShapes });
+    this.drawn = [];
+    const path = scene.estimate.map((pose) => pose.slice(0, 3));
+    this.orbit = new Orbit(canvas, scene.up, [...path, ...this.near(path)], onChange);
+    this.ground = this.findGround(path);
+    this.paths = {
+      odometry: scene.odometry.map((pose) => pose.slice(0, 3)),
+      truth: (scene.truth || []).map((pose) => pose.slice(0, 3)),
+      estimate: path,
+    };
+    let down = [0, 0];
+    canvas.addEventListener("pointerdown", (event) => { down = [event.offsetX, event.offsetY]; });
+    canvas.addEventListener("click", (event) => {
+      const moved = Math.hypot(event.offsetX - down[0], event.offsetY - down[1]);
+      if (moved < 4) onPick(this.pick(event.offsetX, event.offsetY));
+    });
+  }
+
+  /** Centres of the objects, without those so far off that the rest would be a dot. */
+  near(path) {
+    const middle = [0, 1, 2].map((k) => path.reduce((sum, point) => sum + point[k], 0) / path.length);
+    const away = (point) => geometry.length(geometry.subtract(point, middle));
+    const centers = this.scene.objects.map((object) => object.center);
+    const usual = centers.map(away).sort((a, b) => a - b)[Math.floor(centers.length / 2)];
+    const most = 3 * Math.max(usual || 0, ...path.map(away));
+    return centers.filter((center) => away(center) < most);
+  }
+
+  /** The height that the tenth part of the objects reaches down to, or the path, metres. */
+  findGround(path) {
+    const { up, objects } = this.scene;
+    const bottoms = objects.flatMap((object, row) => {
+      if (!this.shapes[row]) return [];
+      const below = this.shapes[row].reduce((sum, line, k) => sum + up[k] * geometry.dot(line, up), 0);
+      return [geometry.dot(object.center, up) - Math.sqrt(below)];
+    }).sort((a, b) => a - b);
+    if (bottoms.length) return bottoms[Math.floor(bottoms.length / 10)];
+    return Math.min(...path.map((point) => geometry.dot(point, up)));
+  }
+
+  /** Draw what the switches ask for; returns how much of each is on the canvas. */
+  draw(shown, frame, selected) {
+    const ratio = window.devicePixelRatio || 1;
+    this.canvas.width = Math.round(this.canvas.clientWidth * ratio);
+    this.canvas.height = Math.round(this.canvas.clientHeight * ratio);
+    this.context = this.canvas.getContext("2d");
+    this.context.scale(ratio, ratio);
+    this.context.lineJoin = "round";
+    this.eye = this.orbit.look();
+    this.counts = { ellipsoids: 0, labels: 0, covariances: 0, cameras: 0, trueObjects: 0, odometry: 0, truth: 0, estimate: 0 };
+    this.drawn = [];
+    this.drawGrid();
+    const items = [];
+    for (const name of ["odometry", "truth", "estimate"]) {
+      if (shown[name]) this.addPath(items, name, name === "truth" ? Infinity : frame);
+    }
+    if (shown.cameras) this.addCameras(items, frame);
+    if (shown.truth) this.scene.trueObjects.forEach((_, row) => this.addTrue(items, row, selected));
+    this.scene.objects.forEach((_, row) => this.addObject(items, row, shown, selected));
+    items.sort((a, b) => b.depth - a.depth).forEach((item) => item.draw());
+    if (shown.names) this.drawNames(selected);
+    return this.counts;
+  }
+
+  /** Draw lines through points of the world; parts behind the eye are cut off. */
+  stroke(points, style) {
+    const { view, lens, near } = this.eye;
+    const path = new Path2D();
+    let before = null;
+    for (const point of points) {
+      const now = geometry.inCamera(view, point);
+      if (before && (now[2] > near || before[2] > near)) {
+        const cut = (a, b) => {
+          const part = (near - a[2]) / (b[2] - a[2]);
+          return geometry.add(a, geometry.scale(part, geometry.subtract(b, a)));
+        };
+        if (before[2] <= near) path.moveTo(...geometry.pixelOf(lens, cut(before, now)));
+        path.lineTo(...geometry.pixelOf(lens, now[2] > near ? now : cut(before, now)));
+      } else if (now[2] > near) {
+        path.moveTo(...geometry.pixelOf(lens, now));
+      }
+      before = now;
+    }
+    Object.assign(this.context, { globalAlpha: 1, lineWidth: 1 }, style);
+    this.context.setLineDash([]);
+    this.context.stroke(path);
+    this.context.globalAlpha = 1;
+  }
+
+  depthOf(point) {
+    return geometry.inCamera(this.eye.view, point)[2];
+  }
+
+  drawGrid() {
+    const { orbit } = this;
+    const [east, north] = orbit.level(orbit.target);
+    const rough = orbit.radius / 5, power = 10 ** Math.floor(Math.log10(rough));
+    this.step = power * [1, 2, 5, 10].find((factor) => factor * power >= rough);
+    const count = 10, half = count * this.step;
+    const e = Math.round(east / this.step) * this.step, n = Math.round(north / this.step) * this.step;
+    for (let k = -count; k <= count; k += 1) {
+      const style = { strokeStyle: "#e3e6ea", lineWidth: 1 };
+      this.stroke([[e + k * this.step, n - half, this.ground], [e + k * this.step, n + half, this.ground]].map(orbit.world), style);
+      this.stroke([[e - half, n + k * this.step, this.ground], [e + half, n + k * this.step, this.ground]].map(orbit.world), style);
+    }
+  }
+
+  /** A path in parts, so that each lies behind or before other things; what is to come is faint. */
+  addPath(items, name, frame) {
+    const points = this.paths[name];
+    const size = Math.max(1, Math.ceil(points.length / 250));
+    const cuts = new Set([0, points.length - 1, Math.min(frame, points.length - 1)]);
+    for (let k = size; k < points.length; k += size) cuts.add(k);
+    const ends = [...cuts].sort((a, b) => a - b);
+    for (let k = 1; k < ends.length; k += 1) {
+      const part = points.slice(ends[k - 1], ends[k] + 1);
+      const style = {
+        strokeStyle: this.scene.colors[name], lineWidth: name === "truth" ? 4 : 2,
+        globalAlpha: name === "truth" ? 0.5 : ends[k] <= frame ? 0.95 : 0.35,
+      };
+      this.counts[name] += part.length - 1;
+      items.push({ depth: this.depthOf(part[part.length >> 1]), draw: () => this.stroke(part, style) });
+    }
+  }
+
+  addCameras(items, frame) {
+    const { estimate } = this.scene;
+    const step = Math.ceil(estimate.length / 60);
+    const size = 0.022 * this.orbit.radius;
+    for (let k = 0; k < estimate.length; k += step) {
+      if (k !== frame) this.addCamera(items, estimate[k], size, { strokeStyle: "#7d8894", globalAlpha: 0.55 });
+    }
+    this.addCamera(items, estimate[frame], 2.5 * size, { strokeStyle: "#111", lineWidth: 1.8 }, frame);
+  }
+
+  /** A pyramid from the camera to its image, which is `size` metres away; boxes on the current one. */
+  addCamera(items, pose, size, style, frame = -1) {
+    const { camera, boxes, objects } = this.scene;
+    const view = geometry.viewOf(pose);
+    const at = (u, v) => geometry.toWorld(view,
+      [size * (u - camera.cx) / camera.fx, size * (v - camera.cy) / camera.fy, size]);
+    const rectangle = (l, t, r, b) => [at(l, t), at(r, t), at(r, b), at(l, b), at(l, t)];
+    const image = rectangle(-0.5, -0.5, camera.width - 0.5, camera.height - 0.5);
+    this.counts.cameras += 1;
+    const draw = () => {
+      this.stroke(image, style);
+      for (const corner of image.slice(0, 4)) this.stroke([view.center, corner], style);
+      boxes.pose.forEach((of, row) => {
+        const object = boxes.object[row];
+        if (of !== frame || object < 0) return;
+        this.stroke(rectangle(...boxes.box[row]), { strokeStyle: objects[object].color, lineWidth: 1.5 });
+      });
+    };
+    items.push({ depth: this.depthOf(view.center), draw });
+  }
+
+  addTrue(items, row, selected) {
+    const object = this.scene.trueObjects[row];
+    const isSelected = selected.true === row;
+    const style = { strokeStyle: this.scene.colors.truth, lineWidth: isSelected ? 3 : 1.6, setLineDash: [5, 4] };
+    this.addOutline(items, object, this.trueShapes[row], { true: row }, (outline) => {
+      this.fill(outline, this.scene.colors.truth + "22", style);
+      this.counts.trueObjects += 1;
+    }, style);
+  }
+
+  addObject(items, row, shown, selected) {
+    const object = this.scene.objects[row];
+    const isSelected = selected.mapped === row;
+    const style = { strokeStyle: isSelected ? "#111" : object.color, lineWidth: isSelected ? 2.6 : 1.2 };
+    if (shown.objects) {
+      this.addOutline(items, object, this.shapes[row], { mapped: row }, (outline) => {
+        this.fill(outline, this.shade(outline, object.color), style);
+        this.drawRings(object);
+        this.counts.ellipsoids += 1;
+      }, style);
+    }
+    if (!shown.covariance || !object.centerCovariance) return;
+    const shape = object.centerCovariance.map((line) => line.map((value) => SIGMAS ** 2 * value));
+    const outline = geometry.outlineOf(this.eye.view, this.eye.lens, object.center, shape);
+    if (!outline) return;
+    // Drawn after its object, which mostly is around it.
+    items.push({ depth: outline.depth - 1e-6, draw: () => {
+      this.fill(outline, "#ffffff70", { strokeStyle: "#111", lineWidth: 1.2, setLineDash: [3, 2] });
+      this.counts.covariances += 1;
+    } });
+  }
+
+  /** Add an object as an outline or, where it is no ellipsoid, as a cross. */
+  addOutline(items, object, shape, name, paint, style) {
+    const { view, lens, near } = this.eye;
+    const outline = shape && geometry.outlineOf(view, lens, object.center, shape);
+    if (outline) {
+      this.drawn.push({ ...name, object, outline });
+      items.push({ depth: outline.depth, draw: () => paint(outline) });
+    } else if (!shape) {
+      const place = geometry.inCamera(view, object.center);
+      if (place[2] <= near) return;
+      const [u, v] = geometry.pixelOf(lens, place);
+      const cross = { u, v, depth: place[2], halfWidth: 6, halfHeight: 6, long: 6, short: 6, angle: 0 };
+      this.drawn.push({ ...name, object, outline: cross });
+      const line = new Path2D(`M${u - 6} ${v}h12M${u} ${v - 6}v12`);
+      items.push({ depth: place[2], draw: () => {
+        Object.assign(this.context, { strokeStyle: style.strokeStyle, lineWidth: 2 });
+        this.context.setLineDash([]);
+        this.context.stroke(line);
+      } });
+    }
+  }
+
+  fill(outline, fill, { setLineDash = [], ...style }) {
+    Object.assign(this.context, style, { fillStyle: fill });
+    this.context.setLineDash(setLineDash);
+    this.context.beginPath();
+    this.context.ellipse(outline.u, outline.v, outline.long, outline.short, outline.angle, 0, 2 * Math.PI);
+    this.context.fill();
+    this.context.stroke();
+  }
+
+  /** A gradient as if light came from the upper left. */
+  shade({ u, v, halfWidth, halfHeight, long }, color) {
+    const light = [u - 0.35 * halfWidth, v - 0.45 * halfHeight];
+    const gradient = this.context.createRadialGradient(...light, 0, u, v, 1.15 * long);
+    const [r, g, b] = [1, 3, 5].map((k) => parseInt(color.slice(k, k + 2), 16));
+    const mix = (other, part, alpha) =>
+      `rgba(${[r, g, b].map((c) => Math.round(c + part * (other - c))).join()},${alpha})`;
+    gradient.addColorStop(0, mix(255, 0.65, 0.85));
+    gradient.addColorStop(0.5, mix(255, 0.15, 0.8));
+    gradient.addColorStop(1, mix(0, 0.25, 0.85));
+    return gradient;
+  }
+
+  /** The three rings of the principal axes, as far as they face the eye: they show how it is turned. */
+  drawRings({ center, semiAxes, orientation, color }) {
+    const axes = geometry.axesOf(orientation);
+    const toEye = geometry.subtract(this.eye.view.center, center);
+    for (const [i, j] of [[0, 1], [1, 2], [2, 0]]) {
+      let part = [];
+      const flush = () => {
+        if (part.length > 1) this.stroke(part, { strokeStyle: "#fff", globalAlpha: 0.55 });
+        part = [];
+      };
+      for (const [c, s] of CIRCLE) {
+        const along = geometry.add(geometry.scale(semiAxes[i] * c, axes[i]), geometry.scale(semiAxes[j] * s, axes[j]));
+        const normal = geometry.add(geometry.scale(c / semiAxes[i], axes[i]), geometry.scale(s / semiAxes[j], axes[j]));
+        if (geometry.dot(normal, geometry.subtract(toEye, along)) > 0) part.push(geometry.add(center, along));
+        else flush();
+      }
+      flush();
+    }
+  }
+
+  /** Names above the objects; of two that would cover each other, only the nearer one's. */
+  drawNames(selected) {
+    const { context } = this;
+    const taken = [];
+    context.font = "12px system-ui, sans-serif";
+    context.textAlign = "center";
+    const order = this.drawn.filter((one) => one.mapped !== undefined)
+      .sort((a, b) => (b.mapped === selected.mapped) - (a.mapped === selected.mapped) || a.outline.depth - b.outline.depth);
+    for (const { object, outline } of order) {
+      const text = `${object.className} ${object.id}`;
+      const half = context.measureText(text).width / 2 + 2;
+      const x = outline.u, y = outline.v - outline.halfHeight - 5;
+      const place = [x - half, y - 12, x + half, y + 3];
+      if (taken.some((t) => place[0] < t[2] && place[2] > t[0] && place[1] < t[3] && place[3] > t[1])) continue;
+      taken.push(place);
+      Object.assign(context, { lineWidth: 3.5, strokeStyle: "#ffffffe0", fillStyle: "#1d2329" });
+      context.setLineDash([]);
+      context.strokeText(text, x, y);
+      context.fillText(text, x, y);
+      this.counts.labels += 1;
+    }
+  }
+
+  /** The nearest object at a place of the canvas, CSS pixels; empty for none. */
+  pick(x, y) {
+    const hit = this.drawn.filter(({ outline }) => geometry.contains(outline, x, y, 3))
+      .sort((a, b) => a.outline.depth - b.outline.depth)[0];
+    if (!hit) return {};
+    return hit.mapped !== undefined ? { mapped: hit.mapped } : { true: hit.true };
+  }
+}
