@@ -22,6 +22,8 @@ from typing import (
 
 import typer
 
+from dqslam._version import version
+
 if TYPE_CHECKING:
     from pydantic import BaseModel
 
@@ -70,16 +72,6 @@ def save_settings(context: typer.Context, path: Path) -> None:
     for key, name in setting_names(context.command).items():
         settings[key] = _plain(context.params[name])
     write_text(path, toml_text(settings))
-
-
-def version() -> str | None:
-    """Return the version of the installed package; None when it is not installed."""
-    from importlib import metadata
-
-    try:
-        return metadata.version("dqslam")
-    except metadata.PackageNotFoundError:
-        return None
 
 
 def setting_names(command: Any) -> dict[str, str]:

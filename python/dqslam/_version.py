@@ -1,0 +1,11 @@
+"""Which version of dqslam this is."""
+
+
+def version() -> str | None:
+    """Return the version of the installed package; None when it is not installed."""
+    from importlib import metadata
+
+    try:
+        return metadata.version("dqslam")
+    except metadata.PackageNotFoundError:
+        return None

@@ -1,0 +1,1 @@
+"""Sweeps: many trials of many settings, resumable, on one machine or a cluster."""
