@@ -17,6 +17,7 @@ from dqslam.cli.evaluate import evaluate
 from dqslam.cli.inspect import inspect
 from dqslam.cli.paper import paper
 from dqslam.cli.run import run
+from dqslam.cli.sweep import sweep
 from dqslam.cli.view import view
 
 # The table of contents: commands in the order of the help, by the title of their panel.
@@ -24,7 +25,7 @@ COMMANDS: dict[str, tuple[Callable[..., None], ...]] = {
     "Start here": (paper,),
     "Your recording": (inspect, convert, run, evaluate),
     "Look": (view,),
-    "Study": (ablation, degeneracy),
+    "Study": (sweep, ablation, degeneracy),
 }
 EXIT_CODES = {
     0: "done",

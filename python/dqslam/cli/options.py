@@ -1,7 +1,7 @@
 """Options that several commands share: the files of a recording, results, trials."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -30,4 +30,19 @@ FirstSeed = Annotated[
 ]
 Jobs = Annotated[
     int | None, typer.Option(min=1, help="Processes at a time. Default: as many as cores.")
+]
+BackendName = Annotated[
+    Literal["serial", "processes", "loky", "dask", "ray"] | None,
+    typer.Option(
+        "--backend",
+        help="Where trials run: in this process; in others, by Python's own pool or joblib's loky; "
+        "on a cluster. Default: loky where joblib is installed, else processes.",
+    ),
+]
+Scheduler = Annotated[
+    str | None,
+    typer.Option(
+        metavar="ADDRESS",
+        help="Of the cluster: tcp://host:8786 of dask, or of ray. Default: one on this machine.",
+    ),
 ]

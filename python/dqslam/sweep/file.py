@@ -193,14 +193,12 @@ def _random(file: TomlFile, said: _File, mistakes: list[FileError]) -> _Varied:
             if one[:depth] == location
         }
         try:
-            drawn_from: _Range = check_model(
-                named, {name: limits}, _CellFile(file.path, "", {}, lines)
-            ).limits
+            checked: Any = check_model(named, {name: limits}, _CellFile(file.path, "", {}, lines))
         except FileErrors as error:
             mistakes += error.errors
             continue
         draws = np.random.default_rng([said.sample_seed, *name.encode()]).random(said.samples)
-        random[name] = [_Value(location, drawn_from.draw(draw)) for draw in draws.tolist()]
+        random[name] = [_Value(location, checked.limits.draw(draw)) for draw in draws.tolist()]
     return random
 
 

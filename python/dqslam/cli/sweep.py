@@ -1,0 +1,116 @@
+"""``dqslam sweep``: many trials of many settings."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from dqslam.cli.options import BackendName, Jobs, ResultDirectory, Scheduler
+from dqslam.cli.output import Json, Output, Quiet
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from dqslam.sweep import CellSummary, SweepSummary
+
+NAMED = 5  # failures of one kind that are named
+
+
+def sweep(
+    file: Annotated[
+        Path, typer.Argument(help="TOML: a scenario, seeds, and the settings to vary.")
+    ],
+    out: ResultDirectory,
+    jobs: Jobs = None,
+    backend: BackendName = None,
+    scheduler: Scheduler = None,
+    quiet: Quiet = False,
+    json: Json = False,
+) -> None:
+    """Vary settings of a scenario or the estimator, over a grid or at random, with many seeds.
+
+    Stopped or killed, the same command goes on where it was. Writes results.csv, a row for each
+    trial, results.parquet where pyarrow is installed, summary.json, and sweep.toml, the file.
+    """
+    from dqslam._files import read_text, write_text
+    from dqslam.sweep import load_sweep, run_sweep
+
+    asked = load_sweep(file)
+    output = Output(quiet=quiet, as_json=json)
+    with output.trials(len(asked.cells) * len(asked.seeds)) as progress:
+        done = run_sweep(
+            asked, out, jobs=jobs, backend=backend, scheduler=scheduler, progress=progress
+        )
+    write_text(out / "sweep.toml", read_text(file))
+    output.table(_table(done.summary))
+    if done.found:
+        output.line(f"{done.done} trials run, {done.found} were there already")
+    for line in _failures(done.failures):
+        output.line(line)
+    for path in done.files[:-1]:
+        output.line(f"wrote {path}")
+    output.file(done.files[-1])
+
+
+def _table(summary: "SweepSummary") -> "Table":
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    seeds = summary.seeds
+    shown = Table(
+        title=f"{summary.scenario}, seeds {seeds[0]} to {seeds[-1]}; in brackets 95 % intervals",
+        box=SIMPLE_HEAD,
+    )
+    for name in _short(summary.parameters).values():
+        shown.add_column(name, justify="right", overflow="fold")
+    has_bound = any("error_over_bound" in cell.metrics for cell in summary.cells)
+    headings = ["positions, m\nmean", "\nmedian", "centres, m\nmean"]
+    for heading in [*headings, *(["error / bound\nmean"] if has_bound else []), "\nfailed"]:
+        shown.add_column(heading, justify="right", no_wrap=True)
+    for cell in summary.cells:
+        positions = cell.metrics.get("rmse_pos")
+        bound = [_mean(cell, "error_over_bound")] if has_bound else []
+        shown.add_row(
+            *map(_text, cell.values.values()),
+            "" if positions is None else _number(positions.mean, positions.mean_interval),
+            "" if positions is None else _number(positions.median, positions.median_interval),
+            _mean(cell, "rmse_landmark"),
+            *bound,
+            str(cell.failed.count),
+        )
+    return shown
+
+
+def _short(names: tuple[str, ...]) -> dict[str, str]:
+    """Leave out of dotted names what is not needed to tell them apart."""
+    last = [name.rsplit(".", 1)[-1] for name in names]
+    return {
+        name: end if last.count(end) == 1 else name for name, end in zip(names, last, strict=True)
+    }
+
+
+def _text(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def _mean(cell: "CellSummary", metric: str) -> str:
+    return _number(cell.metrics[metric].mean) if metric in cell.metrics else ""
+
+
+def _number(number: float, interval: tuple[float, float] | None = None) -> str:
+    if interval is None:
+        return f"{number:.3g}"
+    return f"{number:.3g} \\[{interval[0]:.2g}, {interval[1]:.2g}]"  # a bare [ is rich's markup
+
+
+def _failures(failures: Mapping[str, str]) -> list[str]:
+    """Say each error once, with the trials that it ended."""
+    trials: dict[str, list[str]] = {}
+    for trial, error in failures.items():
+        trials.setdefault(error, []).append(trial)
+    return [
+        f"failed: {error}: {', '.join(named[:NAMED])}"
+        + (f" and {len(named) - NAMED} more" if len(named) > NAMED else "")
+        for error, named in trials.items()
+    ]
