@@ -22,7 +22,7 @@ extensions = [
     "sphinx_copybutton",
     "sphinx_gallery.gen_gallery",
     # From docs/extensions:
-    "core_signatures",
+    "api_signatures",
     "mathml",
     "paper_table",
     "repository_pages",
@@ -34,20 +34,18 @@ generated = DOCS / "_generated"
 # Markdown as a forge shows it: $ for mathematics, headings as targets of links.
 myst_enable_extensions = ["dollarmath", "fieldlist", "attrs_inline"]
 myst_heading_anchors = 3
-suppress_warnings = ["config.cache"]  # sphinx-gallery's settings hold a function
 
 # Every name in a signature is a link or is listed here: what other projects document.
 nitpicky = True
 nitpick_ignore_regex = [
     ("py:.*", r"(numpy|np|pathlib|collections|typing|pydantic|typer|enum|matplotlib)\..*"),
-    ("py:.*", r"(Any|ArrayLike|Path|Callable|Mapping|Sequence|Iterable|Literal|Self|optional)"),
-    ("py:.*", r"(Floats|Ints|Bools|float64|int64|bool|BaseModel|Figure|Axes|ValidationError)"),
-    # Private parts and helpers that public signatures mention.
-    ("py:.*", r"dqslam\..*\._.*"),
+    ("py:.*", r"(Any|ArrayLike|NDArray|ndarray|Align|Ids|TypeAliasForwardRef)"),
+    ("py:.*", r"dict\[.*|dqslam\.experiment\.methods\.Settings|dqslam\.io\.results\.save\..*"),
+    ("py:.*", r"dqslam\.associate\.scene_map\.SceneMap"),  # the inside of an association
 ]
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
-autodoc_type_aliases = {name: name for name in ("Floats", "Ints", "Bools", "Align", "Ids")}
+autodoc_type_aliases = {name: name for name in ("Align", "Ids")}
 autodoc_preserve_defaults = True
 napoleon_numpy_docstring = True
 napoleon_google_docstring = False

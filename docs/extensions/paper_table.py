@@ -1,6 +1,6 @@
 """The paper's experiment, run while the site is built: its table and its figure.
 
-Writes ``_generated/paper_table.md``, which the page on the experiment includes. How many seeds:
+Writes ``_generated/paper_table.txt``, which the page on the experiment includes. How many seeds:
 ``dqslam_paper_trials``; the processes are those of the machine.
 """
 
@@ -47,7 +47,7 @@ def write_table(folder: Path, trials: int) -> None:
         "",
         f"![Simulated drives from above: odometry, truth and estimate](_generated/{FIGURE})",
     ]
-    (folder / "paper_table.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    (folder / "paper_table.txt").write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 def _pair(values: tuple[float, float]) -> str:

@@ -16,6 +16,7 @@ from sphinx.application import Sphinx
 _LINK = re.compile(r"(\]\()(?!https?:|mailto:|#)([^)\s#]+)(#[^)\s]*)?\)")
 _PAGES = {"README.md": "index.md", "CONTRIBUTING.md": "_generated/contributing.md"}
 _PAGES["CHANGELOG.md"] = "_generated/changelog.md"
+_PAGES["examples"] = "_generated/gallery/index.rst"
 _LANGUAGES = {
     ".py": "python",
     ".pyi": "python",

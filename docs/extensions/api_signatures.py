@@ -1,7 +1,8 @@
-"""Signatures of the compiled core, short enough to read.
+"""Signatures and attributes of the API reference, as a reader wants them.
 
 pybind11 writes what a caller may pass in full: ``typing.Annotated[numpy.typing.ArrayLike,
 numpy.float64, "[m, n]"]``. The shapes that matter are in the docstrings, with names and units.
+Napoleon takes an attribute's "Metres: of the centre" for a type and its explanation; it is a text.
 """
 
 import re
@@ -32,6 +33,8 @@ def _shorten(
     signature: str | None,
     returns: str | None,
 ) -> tuple[str | None, str | None] | None:
+    if hasattr(obj, "model_fields"):
+        return "(**settings)", None  # those of a file, which the page shows
     if not name.startswith("dqslam._core."):
         return None
     return _short(signature), _short(returns)
@@ -45,7 +48,29 @@ def _short(text: str | None) -> str | None:
     return text
 
 
+_ATTRIBUTES = ("attribute", "property", "data")
+_kept: dict[str, list[str]] = {}
+
+
+def _keep(
+    app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]
+) -> None:
+    """Remember an attribute's docstring before Napoleon reads it."""
+    if what in _ATTRIBUTES:
+        _kept[name] = list(lines)
+
+
+def _restore(
+    app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]
+) -> None:
+    """Give an attribute its docstring back."""
+    if what in _ATTRIBUTES:
+        lines[:] = _kept.pop(name)
+
+
 def setup(app: Sphinx) -> dict[str, bool]:
-    """Shorten signatures after autodoc has found them."""
+    """Shorten signatures after autodoc has found them; step around Napoleon (priority 500)."""
+    app.connect("autodoc-process-docstring", _keep, priority=400)
+    app.connect("autodoc-process-docstring", _restore, priority=600)
     app.connect("autodoc-process-signature", _shorten)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
