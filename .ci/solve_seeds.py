@@ -14,7 +14,7 @@ import numpy as np
 
 import dqslam as dq
 
-SEEDS = range(4)
+SEEDS = range(5)
 TOLERANCE = 1e-9  # of every number: metres, radians, log-metres
 
 # What a Ceres of a Linux distribution brings along; libgomp comes with its CHOLMOD.
@@ -28,13 +28,15 @@ def foreign_libraries(maps: str) -> list[str]:
 
 
 def solve(seed: int, monocular: bool) -> dict[str, np.ndarray]:
-    """Estimate one drive, down to the last digits: two solvers stop at different ones else."""
+    """Estimate one drive.
+
+    The tolerance stays the default's.  Two solvers take the same steps until the cost changes in its
+    last digits only; from there on rounding says which step is accepted, and results part by 1e-7.
+    """
     recording, _ = dq.simulate(dq.load_scenario("paper"), seed=seed)
     if monocular:
         recording = dataclasses.replace(recording, positions=None)
-    options = dq.SolveOptions()
-    options.function_tolerance = 1e-16
-    estimate, summary = dq.solve(dq.build_graph(recording), options)
+    estimate, summary = dq.solve(dq.build_graph(recording))
     print(f"seed {seed}, {'boxes' if monocular else 'boxes and positions'}: {summary}")
     name = f"{seed}_{'boxes' if monocular else 'positions'}"
     return {f"{name}_poses": estimate.poses, f"{name}_objects": estimate.ellipsoids}
