@@ -30,8 +30,8 @@ def foreign_libraries(maps: str) -> list[str]:
 def solve(seed: int, monocular: bool) -> dict[str, np.ndarray]:
     """Estimate one drive.
 
-    The tolerance stays the default's.  Two solvers take the same steps until the cost changes in its
-    last digits only; from there on rounding says which step is accepted, and results part by 1e-7.
+    The tolerance stays the default's. Two solvers take the same steps until only the cost's last
+    digits change; from there on rounding says which step is accepted, and results part by 1e-7.
     """
     recording, _ = dq.simulate(dq.load_scenario("paper"), seed=seed)
     if monocular:
