@@ -8,7 +8,7 @@ from pathlib import Path, PurePosixPath
 from elftools.elf.elffile import ELFFile  # comes with auditwheel
 
 MAX_BYTES = 3_000_000
-LICENSES = {"LICENSE", "ceres-solver.txt", "eigen.txt", "pybind11.txt"}
+LICENSES = {"LICENSE", "ceres-solver.txt", "eigen.txt", "pybind11.txt", "sources.txt"}
 # Of every Linux with a glibc; all else is in the extension.
 SYSTEM = {"libc.so.6", "libm.so.6", "libpthread.so.0", "libgcc_s.so.1", "libstdc++.so.6"}
 SYSTEM |= {"ld-linux-x86-64.so.2", "ld-linux-aarch64.so.1"}

@@ -14,7 +14,7 @@ import dqslam
 
 ROOT = Path(__file__).resolve().parents[2]
 CORE = Path(dqslam._core.__file__)
-LICENSES = ("LICENSE", "ceres-solver.txt", "eigen.txt", "pybind11.txt")
+LICENSES = ("LICENSE", "ceres-solver.txt", "eigen.txt", "pybind11.txt", "sources.txt")
 
 
 def load(name: str) -> ModuleType:
@@ -63,7 +63,7 @@ def test_size_name_licences_and_binaries_are_checked(
     tmp_path: Path, check_wheel: ModuleType
 ) -> None:
     path = tmp_path / "dqslam-linux.whl"
-    write_wheel(path, licenses=("LICENSE", "eigen.txt"), more="dqslam.libs/libgomp.so.1")
+    write_wheel(path, licenses=("LICENSE", "eigen.txt", "sources.txt"), more="dqslam.libs/libgomp.so.1")
     check_wheel.needed_libraries = lambda elf: {"libm.so.6"}
     size = path.stat().st_size
     check_wheel.MAX_BYTES = size
