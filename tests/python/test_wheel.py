@@ -63,7 +63,9 @@ def test_size_name_licences_and_binaries_are_checked(
     tmp_path: Path, check_wheel: ModuleType
 ) -> None:
     path = tmp_path / "dqslam-linux.whl"
-    write_wheel(path, licenses=("LICENSE", "eigen.txt", "sources.txt"), more="dqslam.libs/libgomp.so.1")
+    write_wheel(
+        path, licenses=("LICENSE", "eigen.txt", "sources.txt"), more="dqslam.libs/libgomp.so.1"
+    )
     check_wheel.needed_libraries = lambda elf: {"libm.so.6"}
     size = path.stat().st_size
     check_wheel.MAX_BYTES = size
