@@ -86,13 +86,10 @@ def _serve(scene: Scene, host: str, port: int, output: Output) -> None:
 
     from dqslam.view import serve
 
-    server = serve(scene, host=host, port=port)
     try:
-        name = "localhost" if host in ("127.0.0.1", "0.0.0.0", "::") else host
-        output.line(f"http://{name}:{server.get_port()} shows {scene.title}; Ctrl-C stops")
-        while True:
-            sleep(3600.0)
-    except KeyboardInterrupt:
+        with serve(scene, host=host, port=port) as address:
+            output.line(f"{address} shows {scene.title}; Ctrl-C stops")
+            while True:
+                sleep(3600.0)
+    except KeyboardInterrupt:  # the usual way to end
         output.line("stopped")
-    finally:
-        server.stop()

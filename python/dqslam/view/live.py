@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, redirect_stdout
 from html import escape
+from io import StringIO
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,12 +19,14 @@ if TYPE_CHECKING:
 
 _CAMERAS = 60  # drawn at most
 _NOTHING = "nothing"
+_HERE = ("127.0.0.1", "0.0.0.0", "::1", "::")
 
 
-def serve(scene: Scene, *, host: str = "127.0.0.1", port: int = 8080) -> ViserServer:
-    """Serve a scene until the server that is returned is stopped; needs ``dqslam[view]``.
+@contextmanager
+def serve(scene: Scene, *, host: str = "127.0.0.1", port: int = 8080) -> Iterator[str]:
+    """Serve a scene while inside, and give the page's address; needs ``dqslam[view]``.
 
-    Where the port is taken it is the next free one: ``server.get_port()``.
+    Where the port is taken it is the next free one.
     """
     try:
         import viser
@@ -30,9 +34,17 @@ def serve(scene: Scene, *, host: str = "127.0.0.1", port: int = 8080) -> ViserSe
         raise RuntimeError(
             "the live page needs viser: pip install 'dqslam[view]' (--export does without)"
         ) from None
-    server = viser.ViserServer(host=host, port=port, label=scene.title, verbose=False)
-    _Page(server, scene)
-    return server
+    with redirect_stdout(StringIO()):  # what is printed is for the command line to say
+        server = viser.ViserServer(host=host, port=port, label=scene.title, verbose=False)
+    try:
+        # Its share button would send the scene to somebody else's server.
+        server.gui.configure_theme(show_logo=False, show_share_button=False)
+        _Page(server, scene)
+        name = "localhost" if host in _HERE else host
+        yield f"http://{name}:{server.get_port()}"
+    finally:
+        with redirect_stdout(StringIO()):
+            server.stop()
 
 
 class _Page:
@@ -44,10 +56,10 @@ class _Page:
         self.selected: int | None = None
         self.radius = _place_eye(server, scene)
         parents = {
-            "estimate": self._path("estimate", scene.estimate, ESTIMATE),
-            "odometry": self._path("odometry", scene.odometry, ODOMETRY),
+            "estimate": self._path("estimate", (scene.estimate,), ESTIMATE),
+            "odometry": self._path("odometry", (scene.odometry,), ODOMETRY),
         }
-        if scene.truth is not None:
+        if scene.truth:
             parents["truth"] = self._group("truth")
             self._path("truth/path", scene.truth, TRUTH)
             for row, one in enumerate(scene.true_objects):
@@ -63,9 +75,8 @@ class _Page:
     def _group(self, name: str) -> Any:
         return self.server.scene.add_frame(f"/{name}", show_axes=False)
 
-    def _path(self, name: str, poses: Floats, color: str) -> Any:
-        points = poses[:, :3]
-        segments = np.stack([points[:-1], points[1:]], axis=1)
+    def _path(self, name: str, runs: tuple[Floats, ...], color: str) -> Any:
+        segments = np.vstack([np.stack([run[:-1, :3], run[1:, :3]], axis=1) for run in runs])
         return self.server.scene.add_line_segments(
             f"/{name}", segments, rgb(color), thickness=3.0, thickness_units="screen"
         )

@@ -58,7 +58,7 @@ def object_numbers(results: Results, evaluation: Mapping[str, Any]) -> list[Numb
             shown.append(("boxes", f"{mine.sum()}, {(mine & boxes.inlier).sum()} fit"))
             known = overlap[mine & np.isfinite(overlap)]
             if len(known):
-                shown.append(("IoU of boxes, median", f"{np.median(known):.3f}"))
+                shown.append(("IoU of boxes", f"{np.median(known):.3f}"))
         described.append((*shown, *_errors(pairs.get(int(objects.id[row])), bool(judged))))
     return described
 
@@ -81,7 +81,7 @@ def _errors(pair: Mapping[str, Any] | None, judged: bool) -> Numbers:
         shown.insert(0, ("true id", str(pair["true_id"])))
     for title, key, form in (
         ("size is off by", "size_relative", "{:.0%}"),
-        ("volume, over the true", "volume_ratio", "{:.2f}"),
+        ("volume ratio", "volume_ratio", "{:.2f}"),
         ("turned by", "orientation_deg", "{:.1f}°"),
         ("IoU in space", "iou_3d", "{:.2f}"),
     ):

@@ -46,7 +46,7 @@ def _describe(scene: Scene) -> dict[str, Any]:
         "timestamps": scene.timestamps.tolist(),
         "estimate": _rounded(scene.estimate),
         "odometry": _rounded(scene.odometry),
-        "truth": None if scene.truth is None else _rounded(scene.truth),
+        "truth": [_rounded(run) for run in scene.truth],
         "objects": [_object(one) for one in scene.objects],
         "trueObjects": [_object(one) for one in scene.true_objects],
         "boxes": {

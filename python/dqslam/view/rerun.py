@@ -41,14 +41,14 @@ def _log_world(stream: RecordingStream, scene: Scene) -> None:
     import rerun
 
     paths = (
-        ("estimate", scene.estimate, ESTIMATE),
-        ("odometry", scene.odometry, ODOMETRY),
+        ("estimate", (scene.estimate,), ESTIMATE),
+        ("odometry", (scene.odometry,), ODOMETRY),
         ("truth", scene.truth, TRUTH),
     )
-    for name, poses, color in paths:
-        if poses is not None:
-            strip = rerun.LineStrips3D([poses[:, :3]], colors=[rgb(color)])
-            stream.log(f"world/{name}", strip, static=True)
+    for name, runs, color in paths:
+        if runs:
+            strips = rerun.LineStrips3D([run[:, :3] for run in runs], colors=[rgb(color)])
+            stream.log(f"world/{name}", strips, static=True)
     _log_objects(stream, "objects", list(scene.objects), [one.color for one in scene.objects])
     true = list(scene.true_objects)
     _log_objects(stream, "true_objects", true, [TRUTH for _ in true], labels=False)

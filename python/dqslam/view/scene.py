@@ -14,7 +14,7 @@ import numpy as np
 
 from dqslam import _core
 from dqslam._checks import Floats, Ints
-from dqslam.evaluate import Align, Alignment
+from dqslam.evaluate import Align, Alignment, up_direction
 from dqslam.evaluate_results import common_poses, evaluate_results
 from dqslam.io import BoxTable, MapObjects, Results, Trajectory, TrueObjects
 from dqslam.view.numbers import Numbers, object_numbers, overview, true_object_numbers
@@ -22,9 +22,8 @@ from dqslam.view.numbers import Numbers, object_numbers, overview, true_object_n
 # Okabe and Ito's, then Tol's: hues that the colour-blind can tell apart.
 ODOMETRY, TRUTH, ESTIMATE = "#0072B2", "#009E73", "#D55E00"
 CLASSES = ("#E69F00", "#56B4E9", "#CC79A7", "#882255", "#999933", "#332288", "#44AA99", "#AA4499")
-# An axis of the world that is as near to what seems up, radians, is up.
-NEAR_AXIS = np.radians(15.0)
-MEAN_UP_WEIGHT = 0.02
+# Where so many times the usual number of poses has no true one, nothing is drawn between.
+GAP = 5.0
 # Of the centre, shown where covariances are.
 SIGMAS = 3.0
 
@@ -106,8 +105,8 @@ class Scene:
     """Shape (n, 7)."""
     odometry: Floats
     """Shape (n, 7)."""
-    truth: Floats | None
-    """True poses at the times that have one, shape (t, 7), t <= n."""
+    truth: tuple[Floats, ...]
+    """True poses at the times that have one, in runs without a gap, each of shape (t, 7)."""
     objects: tuple[SceneObject, ...]
     true_objects: tuple[SceneObject, ...]
     boxes: SceneBoxes
@@ -145,19 +144,20 @@ def build_scene(
     if objects is not None and groundtruth is None:
         raise ValueError(f"{objects.path}: where true objects lie, only a true trajectory can tell")
     evaluation: dict[str, Any] = {}
-    truth = None
+    truth: tuple[Floats, ...] = ()
     true_objects: tuple[SceneObject, ...] = ()
     colors = _class_colors(results.objects, objects)
     if groundtruth is not None:
         evaluation = evaluate_results(results, groundtruth, align=align, objects=objects)
         estimated_from_true = _inverse(evaluation["true_from_estimated"])
-        _, rows = common_poses(results.timestamps, groundtruth)
-        truth = estimated_from_true.apply_poses(groundtruth.world_from_camera[rows])
+        rows, true_rows = common_poses(results.timestamps, groundtruth)
+        poses = estimated_from_true.apply_poses(groundtruth.world_from_camera[true_rows])
+        truth = tuple(np.split(poses, _gaps(rows)))
         if objects is not None:
             true_objects = _true_objects(objects, estimated_from_true, colors)
     return Scene(
         title=results.directory.resolve().name,
-        up=_find_up(results.world_from_camera),
+        up=up_direction(results.world_from_camera),
         camera=results.camera,
         timestamps=results.timestamps,
         estimate=results.world_from_camera,
@@ -168,6 +168,12 @@ def build_scene(
         boxes=_boxes(results.boxes, results.objects),
         overview=overview(results, evaluation),
     )
+
+
+def _gaps(rows: Ints) -> Ints:
+    """Return before which of some rows others are left out, more than usual by far."""
+    steps = np.diff(rows)
+    return np.asarray(np.flatnonzero(steps > GAP * np.median(steps)) + 1)
 
 
 def _inverse(true_from_estimated: Mapping[str, Any]) -> Alignment:
@@ -260,25 +266,3 @@ def _boxes(boxes: BoxTable | None, mapped: MapObjects) -> SceneBoxes:
         class_name=tuple(boxes.class_name[row] for row in order),
         state=tuple(states),
     )
-
-
-def _find_up(poses: Floats) -> Floats:
-    """Return the direction that is up, shape (3,), or the axis of the world near it.
-
-    Files do not say it, but cameras are held without roll on the whole: their x axes are level, so
-    that up is the direction that these do not span. Where all look the same way that leaves the
-    pitch open, and up is the mean of the cameras' own up, which otherwise counts little.
-    """
-    from scipy.spatial.transform import Rotation
-
-    axes = Rotation.from_quat(poses[:, 3:]).as_matrix()
-    right, mean = axes[:, :, 0], -axes[:, :, 1].mean(axis=0)
-    level = right.T @ right / len(poses) - MEAN_UP_WEIGHT * np.outer(mean, mean)
-    up = np.linalg.eigh(level)[1][:, 0]
-    up = up if up @ mean >= 0.0 else -up
-    axis = int(np.argmax(np.abs(up)))
-    if abs(up[axis]) < np.cos(NEAR_AXIS):
-        return np.asarray(up)
-    nearest = np.zeros(3)
-    nearest[axis] = np.sign(up[axis])
-    return nearest

@@ -2,11 +2,9 @@
 "use strict";
 
 class ImageView {
-  /** `shapes` are those of the objects, null where one is no ellipsoid. */
-  constructor(canvas, scene, shapes, onPick) {
-    Object.assign(this, { canvas, scene, shapes });
-    this.rows = scene.timestamps.map(() => []);
-    scene.boxes.pose.forEach((pose, row) => this.rows[pose].push(row));
+  /** `shapes` are those of the objects, null where one is no ellipsoid; `boxesOf` rows of each image. */
+  constructor(canvas, scene, { shapes, boxesOf }, onPick) {
+    Object.assign(this, { canvas, scene, shapes, boxesOf });
     canvas.style.aspectRatio = `${scene.camera.width} / ${scene.camera.height}`;
     canvas.addEventListener("click", (event) => onPick(this.pick(event.offsetX, event.offsetY)));
     this.outlines = [];
@@ -23,7 +21,7 @@ class ImageView {
     // Whole numbers are centres of pixels, hence the border is half a pixel before them.
     context.setTransform(ratio * this.scale, 0, 0, ratio * this.scale,
       ratio * this.scale / 2, ratio * this.scale / 2);
-    const rows = this.rows[frame];
+    const rows = this.boxesOf[frame];
     const seen = new Set(rows.map((row) => boxes.object[row]));
     this.outlines = this.outlinesIn(frame);
     for (const { row, outline } of this.outlines) {

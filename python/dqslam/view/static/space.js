@@ -6,18 +6,18 @@ const CIRCLE = Array.from({ length: 49 }, (_, k) => [Math.cos(k * Math.PI / 24),
 const SIGMAS = 3;
 
 class SpaceView {
-  /** `shapes` and `trueShapes` are those of the objects, null where one is no ellipsoid. */
-  constructor(canvas, scene, shapes, trueShapes, { onPick, onChange }) {
-    Object.assign(this, { canvas, scene, shapes, trueShapes });
+  /**
+   * `shapes` and `trueShapes` are those of the objects, null where one is no ellipsoid; `boxesOf`
+   * has the rows of the boxes of each image.
+   */
+  constructor(canvas, scene, { shapes, trueShapes, boxesOf }, { onPick, onChange }) {
+    Object.assign(this, { canvas, scene, shapes, trueShapes, boxesOf });
     this.drawn = [];
     const path = scene.estimate.map((pose) => pose.slice(0, 3));
     this.orbit = new Orbit(canvas, scene.up, [...path, ...this.near(path)], onChange);
     this.ground = this.findGround(path);
-    this.paths = {
-      odometry: scene.odometry.map((pose) => pose.slice(0, 3)),
-      truth: (scene.truth || []).map((pose) => pose.slice(0, 3)),
-      estimate: path,
-    };
+    const places = (poses) => poses.map((pose) => pose.slice(0, 3));
+    this.paths = { odometry: [places(scene.odometry)], truth: scene.truth.map(places), estimate: [path] };
     let down = [0, 0];
     canvas.addEventListener("pointerdown", (event) => { down = [event.offsetX, event.offsetY]; });
     canvas.addEventListener("click", (event) => {
@@ -62,7 +62,8 @@ class SpaceView {
     this.drawGrid();
     const items = [];
     for (const name of ["odometry", "truth", "estimate"]) {
-      if (shown[name]) this.addPath(items, name, name === "truth" ? Infinity : frame);
+      if (!shown[name]) continue;
+      for (const run of this.paths[name]) this.addPath(items, name, run, name === "truth" ? Infinity : frame);
     }
     if (shown.cameras) this.addCameras(items, frame);
     if (shown.truth) this.scene.trueObjects.forEach((_, row) => this.addTrue(items, row, selected));
@@ -116,8 +117,7 @@ class SpaceView {
   }
 
   /** A path in parts, so that each lies behind or before other things; what is to come is faint. */
-  addPath(items, name, frame) {
-    const points = this.paths[name];
+  addPath(items, name, points, frame) {
     const size = Math.max(1, Math.ceil(points.length / 250));
     const cuts = new Set([0, points.length - 1, Math.min(frame, points.length - 1)]);
     for (let k = size; k < points.length; k += size) cuts.add(k);
@@ -155,11 +155,11 @@ class SpaceView {
     const draw = () => {
       this.stroke(image, style);
       for (const corner of image.slice(0, 4)) this.stroke([view.center, corner], style);
-      boxes.pose.forEach((of, row) => {
-        const object = boxes.object[row];
-        if (of !== frame || object < 0) return;
-        this.stroke(rectangle(...boxes.box[row]), { strokeStyle: objects[object].color, lineWidth: 1.5 });
-      });
+      for (const row of frame < 0 ? [] : this.boxesOf[frame]) {
+        if (boxes.object[row] < 0) continue;
+        const style = { strokeStyle: objects[boxes.object[row]].color, lineWidth: 1.5 };
+        this.stroke(rectangle(...boxes.box[row]), style);
+      }
     };
     items.push({ depth: this.depthOf(view.center), draw });
   }
@@ -283,11 +283,12 @@ class SpaceView {
     }
   }
 
-  /** The nearest object at a place of the canvas, CSS pixels; empty for none. */
+  /** The nearest object at a place of the canvas, CSS pixels, a mapped one if any; empty for none. */
   pick(x, y) {
-    const hit = this.drawn.filter(({ outline }) => geometry.contains(outline, x, y, 3))
-      .sort((a, b) => a.outline.depth - b.outline.depth)[0];
+    const isTrue = (one) => one.mapped === undefined;
+    const [hit] = this.drawn.filter(({ outline }) => geometry.contains(outline, x, y, 3))
+      .sort((a, b) => isTrue(a) - isTrue(b) || a.outline.depth - b.outline.depth);
     if (!hit) return {};
-    return hit.mapped !== undefined ? { mapped: hit.mapped } : { true: hit.true };
+    return isTrue(hit) ? { true: hit.true } : { mapped: hit.mapped };
   }
 }

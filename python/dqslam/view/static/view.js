@@ -17,12 +17,16 @@
     object.semiAxes && geometry.shapeOf(object.semiAxes, object.orientation));
 
   const shown = { estimate: true, odometry: true, truth: true, cameras: true, objects: true, names: true, covariance: false, follow: false };
-  let frame = 0, selected = {}, waiting = false, playing = 0;
+  // The last image at first: paths that lie ahead are faint.
+  let frame = scene.timestamps.length - 1, selected = {}, waiting = false, playing = 0;
 
   const shapes = shapesOf(scene.objects), trueShapes = shapesOf(scene.trueObjects);
   const select = (picked) => { selected = picked; showSelected(); redraw(); };
-  const space = new SpaceView(element("space"), scene, shapes, trueShapes, { onPick: select, onChange: redraw });
-  const image = new ImageView(element("image"), scene, shapes,
+  const boxesOf = scene.timestamps.map(() => []);
+  scene.boxes.pose.forEach((pose, row) => boxesOf[pose].push(row));
+  const space = new SpaceView(element("space"), scene, { shapes, trueShapes, boxesOf },
+    { onPick: select, onChange: redraw });
+  const image = new ImageView(element("image"), scene, { shapes, boxesOf },
     (row) => select(row < 0 ? {} : { mapped: row }));
 
   function redraw() {
@@ -31,11 +35,13 @@
     requestAnimationFrame(() => {
       waiting = false;
       const counts = { ...space.draw(shown, frame, selected), image: image.draw(frame, selected.mapped) };
+      const places = space.drawn.filter((one) => one.mapped !== undefined)
+        .map(({ object, outline }) => ({ id: object.id, u: outline.u, v: outline.v }));
       const time = Number(scene.timestamps[frame].toFixed(3));
       element("status").value = `image ${frame + 1} of ${scene.timestamps.length}, ${time} s: `
         + `${counts.image.boxes} boxes, ${counts.image.outlines} objects`;
       element("hint").textContent = `Grid ${Number(space.step.toPrecision(3))} m. Drag to turn, shift and drag to move, wheel to zoom, click an object.`;
-      window.onScreen = counts; // what tests and scripts read
+      window.onScreen = { ...counts, places }; // for tests and scripts
     });
   }
 
@@ -45,7 +51,7 @@
       names: "names", covariance: "covariance, 3σ of centres", follow: "follow the camera",
     };
     const absent = {
-      truth: !scene.truth, objects: !scene.objects.length, names: !scene.objects.length,
+      truth: !scene.truth.length, objects: !scene.objects.length, names: !scene.objects.length,
       covariance: !scene.objects.some((object) => object.centerCovariance),
     };
     for (const [name, title] of Object.entries(titles)) {
@@ -118,7 +124,7 @@
   element("overview").append(...table(scene.overview));
   makeSwitches();
   makeList();
-  element("time").max = String(scene.timestamps.length - 1);
+  element("time").max = element("time").value = String(frame);
   element("time").addEventListener("input", (event) => { stop(); go(Number(event.target.value)); });
   element("play").addEventListener("click", () => (playing ? stop() : play()));
   new ResizeObserver(redraw).observe(element("space"));
