@@ -13,16 +13,18 @@ from dqslam._files import FileErrors
 from dqslam.cli.ablation import ablation
 from dqslam.cli.convert import convert
 from dqslam.cli.degeneracy import degeneracy
+from dqslam.cli.demo import demo
 from dqslam.cli.evaluate import evaluate
 from dqslam.cli.inspect import inspect
 from dqslam.cli.paper import paper
 from dqslam.cli.run import run
+from dqslam.cli.simulate import simulate
 from dqslam.cli.sweep import sweep
 from dqslam.cli.view import view
 
 # The table of contents: commands in the order of the help, by the title of their panel.
 COMMANDS: dict[str, tuple[Callable[..., None], ...]] = {
-    "Start here": (paper,),
+    "Start here": (demo, paper, simulate),
     "Your recording": (inspect, convert, run, evaluate),
     "Look": (view,),
     "Study": (sweep, ablation, degeneracy),

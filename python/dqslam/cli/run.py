@@ -77,6 +77,10 @@ def run(
             "else its level is estimated from the boxes.",
         ),
     ] = None,
+    odometry_covariance: Annotated[
+        Path | None,
+        typer.Option(help="In its place: CSV of the covariance of each step, m and rad squared."),
+    ] = None,
     groundtruth: Annotated[
         Path | None, typer.Option(help="TUM trajectory to compare with, in any world frame.")
     ] = None,
@@ -106,6 +110,8 @@ def run(
     sizes = None if size_priors is None else load_size_priors(size_priors)
     added = parse_noise("--perturb-odometry", perturb_odometry)
     believed = parse_noise("--odometry-noise", odometry_noise) or added
+    if odometry_covariance is not None and believed is not None:
+        raise ValueError("--odometry-covariance: the noise is given already, by another option")
     final = trust_ids == 1.0 and ids != "none"
     names = io.split_formats(formats or [])
     frames = io.choose_frame_times(odometry, detections, names, times=frame_times, rate=frame_rate)
@@ -126,6 +132,7 @@ def run(
             final_ids=final,
             max_time_difference=max_time_difference,
             odometry_noise=believed,
+            odometry_covariance=odometry_covariance,
             formats=names,
             frames=frames,
         )
@@ -139,7 +146,7 @@ def run(
             mode=_core.Mode[mode.upper()],
             reference=reference,
             size_prior=sizes,
-            estimates_noise=believed is None,
+            estimates_noise=believed is None and odometry_covariance is None,
             hold_out=hold_out,
             seed=seed,
             progress=progress,
@@ -154,6 +161,7 @@ def run(
         "trust_ids": None if ids == "none" else trust_ids,
         "odometry_noise_added": None if added is None else asdict(added) | {"seed": seed},
         "odometry_noise_believed": None if believed is None else asdict(believed),
+        "odometry_covariance": None if odometry_covariance is None else str(odometry_covariance),
         "dropped_boxes": asdict(dropped),
         "reference": reference_name,
         **result.report,

@@ -121,5 +121,5 @@ def _setting_type(annotation: Any) -> Any:
 
 def _plain(value: Any) -> Any:
     if isinstance(value, list | tuple):
-        return [_plain(one) for one in value]
+        return [_plain(one) for one in value] or None
     return str(value) if isinstance(value, Path) else value

@@ -25,10 +25,13 @@ from dqslam.io.results import MapObjects as MapObjects
 from dqslam.io.results import Results as Results
 from dqslam.io.results import load_results as load_results
 from dqslam.io.results import save_estimate as save_estimate
+from dqslam.io.simulated import save_recording as save_recording
+from dqslam.io.simulated import save_truth as save_truth
 from dqslam.io.sources import FormatNames as FormatNames
 from dqslam.io.sources import choose_frame_times as choose_frame_times
 from dqslam.io.sources import kind_of as kind_of
 from dqslam.io.sources import split_formats as split_formats
+from dqslam.io.step_covariances import read_step_covariances as read_step_covariances
 from dqslam.io.trajectory import TRAJECTORY_FORMATS as TRAJECTORY_FORMATS
 from dqslam.io.trajectory import Trajectory as Trajectory
 from dqslam.io.trajectory import read_trajectory as read_trajectory

@@ -15,6 +15,7 @@ from dqslam.io.detections import DetectionTable, read_detections
 from dqslam.io.files import FileError
 from dqslam.io.frames import FrameTimes
 from dqslam.io.sources import FormatNames
+from dqslam.io.step_covariances import read_step_covariances
 from dqslam.io.trajectory import read_trajectory
 from dqslam.recording import Detections, Odometry, Recording
 
@@ -75,6 +76,7 @@ def load_recording(
     final_ids: bool = True,
     max_time_difference: float | None = None,
     odometry_noise: OdometryNoise | None = None,
+    odometry_covariance: str | Path | None = None,
     formats: FormatNames | None = None,
     frames: FrameTimes | None = None,
 ) -> tuple[Recording, Dropped]:
@@ -97,6 +99,8 @@ def load_recording(
         half the median interval between poses.
     odometry_noise
         The uncertainty of one step, which trajectory files do not carry.
+    odometry_covariance
+        In its place, a file of the covariance of each step: see ``io.step_covariances``.
     formats
         Names of the formats, where files do not look like what they are.
     frames
@@ -126,7 +130,10 @@ def load_recording(
     if not rows.size:
         raise FileError(detections, _nothing_left(table, dropped, ids, tolerance, times))
     model = _core.PoseModel.SE3
-    noise = odometry_noise or OdometryNoise()
+    steps = len(path) - 1
+    covariance = (odometry_noise or OdometryNoise()).covariance(steps)
+    if odometry_covariance is not None:
+        covariance = read_step_covariances(odometry_covariance, times)
     classes = dict(zip(table.class_id.tolist(), table.class_name, strict=True))
     recording = Recording(
         camera=lens,
@@ -135,7 +142,7 @@ def load_recording(
             pose_model=model,
             first_pose=path[0],
             relative=_core.between(model, path[:-1], path[1:]),
-            covariance=noise.covariance(len(path) - 1),
+            covariance=covariance,
         ),
         detections=Detections(
             pose=pose[rows],

@@ -35,13 +35,18 @@ def write_covariances(path: str | Path, estimate: Estimate, covariances: Floats)
         raise ValueError(
             f"marginals.poses: expected shape {(count, size, size)}, got {covariances.shape}"
         )
-    camera_from_robot = _camera_from_robot(estimate.pose_model, estimate.camera)
+    camera_from_robot = motion_of_camera(estimate.pose_model, estimate.camera)
     moved = camera_from_robot @ covariances @ camera_from_robot.T
-    known = np.flatnonzero(np.isfinite(moved).all(axis=(1, 2)))
+    known = np.isfinite(moved).all(axis=(1, 2))
+    write_rows(path, estimate.timestamps[known], moved[known])
+
+
+def write_rows(path: str | Path, timestamps: Floats, covariances: Floats) -> None:
+    """Write covariances (n, 6, 6) as they are, a row for each of the times (n,)."""
     lines = [",".join(("timestamp", *ENTRIES)) + "\n"]
-    for row in known:
-        entries = (f"{entry:.9g}" for entry in moved[row][_ROWS, _COLUMNS])
-        lines.append(",".join((repr(float(estimate.timestamps[row])), *entries)) + "\n")
+    for time, covariance in zip(timestamps.tolist(), covariances, strict=True):
+        entries = (f"{entry:.9g}" for entry in covariance[_ROWS, _COLUMNS])
+        lines.append(",".join((repr(time), *entries)) + "\n")
     write_text(path, lines)
 
 
@@ -61,7 +66,7 @@ def read_covariances(path: str | Path, timestamps: Floats) -> Floats:
     return covariances
 
 
-def _camera_from_robot(model: _core.PoseModel, camera: _core.Camera) -> Floats:
+def motion_of_camera(model: _core.PoseModel, camera: _core.Camera) -> Floats:
     """Return what turns a small motion of the robot into one of its camera, shape (6, k).
 
     A camera at t, turned by R, on a robot that moves by v and turns by w, all in its frame, moves

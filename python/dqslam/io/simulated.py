@@ -1,0 +1,97 @@
+"""A recording and its truth into the files that the rest of the program reads."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from dqslam import _core
+from dqslam._checks import Floats
+from dqslam.io.camera.table import write_json_camera
+from dqslam.io.detections.csv import REQUIRED, write_csv
+from dqslam.io.detections.table import DetectionTable
+from dqslam.io.files import write_text
+from dqslam.io.step_covariances import write_step_covariances
+from dqslam.io.trajectory import write_trajectory
+from dqslam.recording import Recording, Truth
+
+
+def save_recording(recording: Recording, directory: str | Path) -> None:
+    """Write camera.json, odometry.txt, odometry_covariance.csv and boxes.csv: see `load_recording`.
+
+    The odometry as the poses that it leads to, world_from_camera. The id of an object is its
+    track_id. Relative positions are left out: no format has a place for them.
+
+    Raises
+    ------
+    ValueError
+        When the lens has distortion: files have boxes of the image as it was recorded.
+    """
+    if recording.camera.has_distortion:
+        raise ValueError("recording.camera: boxes of a lens with distortion cannot be written")
+    directory = Path(directory)
+    odometry, boxes = recording.odometry, recording.detections
+    path = _core.dead_reckon(odometry.pose_model, odometry.first_pose, odometry.relative)
+    write_json_camera(directory / "camera.json", recording.camera)
+    _write_path(directory / "odometry.txt", recording, odometry.pose_model, path)
+    write_step_covariances(directory / "odometry_covariance.csv", recording)
+    table = DetectionTable(
+        path=str(directory / "boxes.csv"),
+        columns=(*REQUIRED, "track_id"),
+        line=np.arange(2, len(boxes) + 2),
+        frame=boxes.pose,
+        timestamp=recording.timestamps[boxes.pose],
+        box=boxes.box,
+        score=boxes.score,
+        class_id=boxes.class_id,
+        class_name=tuple(boxes.class_names[number] for number in boxes.class_id.tolist()),
+        track_id=boxes.object_id,
+    )
+    write_csv(directory / "boxes.csv", table)
+
+
+def save_truth(truth: Truth, recording: Recording, directory: str | Path) -> None:
+    """Write groundtruth.txt, objects.csv and true_boxes.csv, for `dqslam evaluate`.
+
+    An object that is no ellipsoid has the size of a cube of its volume, and no orientation.
+    """
+    directory = Path(directory)
+    _write_path(directory / "groundtruth.txt", recording, truth.pose_model, truth.poses)
+    names = ["object_id", "class_name", "x", "y", "z", "sx", "sy", "sz"]
+    columns: list[Sequence[object]] = [truth.object_id.tolist(), truth.class_name]
+    if truth.ellipsoids is None:
+        numbers = np.column_stack([truth.center, *[np.cbrt(truth.volume)] * 3])
+    else:
+        names += ["qx", "qy", "qz", "qw"]
+        rows = [_core.axes_from_ellipsoid(ellipsoid) for ellipsoid in truth.ellipsoids]
+        numbers = np.array([[*center, *2.0 * axes, *turn] for center, axes, turn in rows])
+    columns += _columns(numbers)
+    _write_table(directory / "objects.csv", names, columns)
+    boxes = recording.detections
+    if truth.box_object_id is not None:
+        columns = _columns(np.column_stack([recording.timestamps[boxes.pose], boxes.box]))
+        columns.append(truth.box_object_id.tolist())
+        names = ["timestamp", "x1", "y1", "x2", "y2", "track_id"]
+        _write_table(directory / "true_boxes.csv", names, columns)
+
+
+def _write_path(path: Path, recording: Recording, model: _core.PoseModel, poses: Floats) -> None:
+    cameras = _core.world_from_camera(model, recording.camera, poses)
+    write_trajectory(path, recording.timestamps, cameras)
+
+
+def _columns(numbers: Floats) -> list[Sequence[object]]:
+    """Give numbers (n, k) as k columns of texts that read back to the last bit."""
+    return [[repr(value) for value in column] for column in numbers.T.tolist()]
+
+
+def _write_table(path: Path, names: Sequence[str], columns: Iterable[Sequence[object]]) -> None:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(names)
+    writer.writerows(zip(*columns, strict=True))
+    write_text(path, text.getvalue())
