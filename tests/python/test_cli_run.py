@@ -39,6 +39,7 @@ def test_writes_what_it_says(files, orbit, capsys):
         "boxes.csv",
         "camera.json",
         "config.toml",
+        "covariance.csv",
         "map.json",
         "odometry.txt",
         "report.json",
