@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from dqslam import _core
-from dqslam.evaluate import project_outlines, through_lens
+from dqslam.evaluate import boxes_through_lens, project_outlines, through_lens
 from oracle import ellipsoid_surface, se3_matrix, to_pixels
 
 CAMERA = _core.Camera(500.0, 510.0, 321.0, 239.0, 640, 480)
@@ -84,3 +84,14 @@ def test_the_lens_bends_what_the_image_shows_and_nothing_far_from_it():
     assert not np.allclose(bent[0, 1], points[0, 1], atol=0.5)
     assert np.isnan(bent[0, 2:]).all()
     np.testing.assert_array_equal(through_lens(CAMERA, points), points)
+
+
+def test_boxes_come_back_through_the_lens():
+    lens = _core.Camera(
+        520, 521, 325, 249, 640, 480, distortion=[0.231, -0.785, -0.003, -0.0001, 0.917]
+    )
+    boxes = np.array([[10.0, 20, 100, 220], [300, 200, 420, 470], [500, 5, 630, 90]])
+    back = boxes_through_lens(lens, lens.undistort_boxes(boxes))
+    np.testing.assert_allclose(back, boxes, atol=0.2)
+    assert np.abs(lens.undistort_boxes(boxes) - boxes).max() > 1.0
+    np.testing.assert_array_equal(boxes_through_lens(CAMERA, boxes), boxes)

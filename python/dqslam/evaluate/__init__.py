@@ -17,6 +17,7 @@ from dqslam.evaluate.objects import match_by_id as match_by_id
 from dqslam.evaluate.objects import match_nearest as match_nearest
 from dqslam.evaluate.objects import orientation_error as orientation_error
 from dqslam.evaluate.objects import size_error as size_error
+from dqslam.evaluate.outline import boxes_through_lens as boxes_through_lens
 from dqslam.evaluate.outline import project_outlines as project_outlines
 from dqslam.evaluate.outline import through_lens as through_lens
 from dqslam.evaluate.simulation import Report as Report
@@ -33,3 +34,4 @@ from dqslam.evaluate.trajectory import TrajectoryError as TrajectoryError
 from dqslam.evaluate.trajectory import absolute_trajectory_error as absolute_trajectory_error
 from dqslam.evaluate.trajectory import relative_pose_error as relative_pose_error
 from dqslam.evaluate.trajectory import statistics as statistics
+from dqslam.evaluate.upright import up_direction as up_direction

@@ -72,6 +72,17 @@ def through_lens(camera: _core.Camera, outlines: Floats) -> Floats:
     return np.where(hidden[..., None], np.nan, bent)
 
 
+def boxes_through_lens(camera: _core.Camera, boxes: Floats) -> Floats:
+    """Return boxes (m, 4) in the pixels of the image as recorded: each edge at its middle."""
+    if not camera.has_distortion:
+        return boxes
+    u_min, v_min, u_max, v_max = boxes.T
+    u, v = (u_min + u_max) / 2.0, (v_min + v_max) / 2.0
+    middles = np.stack([[u_min, v], [u, v_min], [u_max, v], [u, v_max]]).transpose(0, 2, 1)
+    bent = through_lens(camera, middles)
+    return np.column_stack([bent[0, :, 0], bent[1, :, 1], bent[2, :, 0], bent[3, :, 1]])
+
+
 def _factors(ellipsoids: Floats) -> Floats:
     """Return L of S = L L^T, shape (m, 3, 3), from log-Cholesky parameters."""
     lower = np.zeros((len(ellipsoids), 3, 3))

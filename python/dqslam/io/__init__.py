@@ -14,6 +14,7 @@ from dqslam.io.files import write_json as write_json
 from dqslam.io.frames import FrameTimes as FrameTimes
 from dqslam.io.frames import frame_rate as frame_rate
 from dqslam.io.frames import read_frame_times as read_frame_times
+from dqslam.io.images import find_images as find_images
 from dqslam.io.mount import read_mount as read_mount
 from dqslam.io.ply import write_ply as write_ply
 from dqslam.io.recording import Dropped as Dropped

@@ -1,0 +1,95 @@
+"""Which image file was taken at which pose: by time stamps, by numbers of frames, or by order."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from dqslam._checks import Floats
+from dqslam.io.files import FileError
+from dqslam.io.frames import FrameTimes, frame_of, image_name
+from dqslam.io.recording import nearest_pose
+
+SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".ppm", ".pgm", ".tif", ".tiff", ".webp")
+_NANOSECONDS = 1e15  # seconds would be after the year 30 000 000
+
+
+def find_images(
+    folder: str | Path, timestamps: Floats, frames: FrameTimes | None = None
+) -> dict[int, Path]:
+    """Return the image file of each pose that has one, by row; times of the poses (n,), seconds.
+
+    What tells an image's time is the first of
+
+    - ``frames``, by the name of the image or the number in it;
+    - its name, if all names are times in seconds (``1311868164.363181.png``; ``000703.png`` where
+      poses are at whole seconds) or nanoseconds: the image nearest in time is taken, within half
+      the median interval of the poses;
+    - its place among the names in their order, if there are as many images as poses.
+    """
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise FileError(folder, "no such folder of images")
+    files = sorted(one for one in folder.iterdir() if one.suffix.lower() in SUFFIXES)
+    if not files:
+        raise FileError(folder, f"holds no images ({', '.join(SUFFIXES)})")
+    if frames is not None:
+        found = _nearest(timestamps, *_framed(files, frames))
+        if not found:
+            raise FileError(folder, f"no image is of the time of a pose, by {frames.source}")
+        return found
+    times = _times(files, timestamps)
+    found = {} if times is None else _nearest(timestamps, files, times)
+    if found:
+        return found
+    if len(files) == len(timestamps):
+        return dict(enumerate(files))
+    raise FileError(
+        folder,
+        f"{len(files)} images (the first is {files[0].name}), {len(timestamps)} poses from "
+        f"{timestamps[0]:.6f} s: the names are not times of poses, hence say when frames were "
+        "taken with --frame-times or --frame-rate",
+    )
+
+
+def _framed(files: list[Path], frames: FrameTimes) -> tuple[list[Path], Floats]:
+    """Return the images whose frame has a time, and their times."""
+    kept, times = [], []
+    for file in files:
+        frame = frame_of(file.name, frames)
+        if frame is None or (frames.table is not None and frame not in frames.table):
+            continue
+        kept.append(file)
+        times.append(frame / frames.rate if frames.table is None else frames.table[frame])
+    return kept, np.array(times, dtype=float)
+
+
+def _times(files: list[Path], timestamps: Floats) -> Floats | None:
+    """Return the times that the names are; None unless all are.
+
+    Whole numbers are mostly those of frames: they are times of poses at whole seconds, or so long
+    that they must be nanoseconds.
+    """
+    names = [image_name(file.name) for file in files]
+    try:
+        times = np.array([float(name) for name in names])
+    except ValueError:
+        return None
+    if not all(name.isdigit() for name in names):
+        return times
+    if (times >= _NANOSECONDS).all():
+        return 1e-9 * times
+    return times if (timestamps == np.round(timestamps)).all() else None
+
+
+def _nearest(timestamps: Floats, files: list[Path], times: Floats) -> dict[int, Path]:
+    """Return the image nearest in time to each pose, within half their median interval."""
+    if not files:
+        return {}
+    tolerance = 0.5 * float(np.median(np.diff(timestamps))) if len(timestamps) > 1 else np.inf
+    order = np.argsort(times)
+    nearest, off = np.zeros(len(timestamps), dtype=np.int64), np.abs(timestamps - times[0])
+    if len(files) > 1:
+        nearest, off = nearest_pose(times[order], timestamps)
+    return {int(row): files[order[nearest[row]]] for row in np.flatnonzero(off <= tolerance)}
