@@ -1,5 +1,4 @@
 import json
-import multiprocessing
 import struct
 
 import numpy as np
@@ -18,7 +17,6 @@ from dqslam.ablation import (
     tabulate,
 )
 from dqslam.cli import main
-from dqslam.pool import run_each
 
 PAPER = load_scenario("paper")
 OURS = Variant()
@@ -157,17 +155,3 @@ def test_command_writes_table_and_figure(tmp_path, capsys, monkeypatch):
 def test_bad_settings_are_refused(settings, message):
     with pytest.raises(ValueError, match=message):
         run_ablation(PAPER, **{"trials": 1, "seed": 0} | settings)
-
-
-# --- processes -----------------------------------------------------------------------------------
-
-
-def test_processes_give_what_one_gives():
-    assert list(run_each(abs, [-1, 2, -3], jobs=1)) == [1, 2, 3]
-    assert sorted(run_each(abs, [-1, 2, -3], jobs=2)) == [1, 2, 3]
-
-
-def test_an_error_in_a_process_stops_the_others():
-    with pytest.raises(ZeroDivisionError):
-        list(run_each((1).__truediv__, [1, 0, 1], jobs=2))
-    assert not multiprocessing.active_children()

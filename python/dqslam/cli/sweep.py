@@ -61,13 +61,16 @@ def _table(summary: "SweepSummary") -> "Table":
     shown = Table(
         title=f"{summary.scenario}, seeds {seeds[0]} to {seeds[-1]}; in brackets 95 % intervals",
         box=SIMPLE_HEAD,
+        padding=(0, 1, 0, 0),
     )
     for name in _short(summary.parameters).values():
-        shown.add_column(name, justify="right", overflow="fold")
+        shown.add_column(name.replace("_", "\n"), justify="right", no_wrap=True)
     has_bound = any("error_over_bound" in cell.metrics for cell in summary.cells)
-    headings = ["positions, m\nmean", "\nmedian", "centres, m\nmean"]
-    for heading in [*headings, *(["error / bound\nmean"] if has_bound else []), "\nfailed"]:
-        shown.add_column(heading, justify="right", no_wrap=True)
+    for heading in ("positions, m\nmean", "\nmedian"):
+        shown.add_column(heading, justify="right", min_width=13)
+    bound_heading = ["error/bound\nmean"] if has_bound else []
+    for heading in ("centres, m\nmean", *bound_heading, "\nfailed"):
+        shown.add_column(heading, justify="right")
     for cell in summary.cells:
         positions = cell.metrics.get("rmse_pos")
         bound = [_mean(cell, "error_over_bound")] if has_bound else []
@@ -101,7 +104,8 @@ def _mean(cell: "CellSummary", metric: str) -> str:
 def _number(number: float, interval: tuple[float, float] | None = None) -> str:
     if interval is None:
         return f"{number:.3g}"
-    return f"{number:.3g} \\[{interval[0]:.2g}, {interval[1]:.2g}]"  # a bare [ is rich's markup
+    # A bare [ would be rich's markup; without a space in it, the interval is never broken.
+    return f"{number:.3g} \\[{interval[0]:.2g},{interval[1]:.2g}]"
 
 
 def _failures(failures: Mapping[str, str]) -> list[str]:
