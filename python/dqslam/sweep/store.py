@@ -54,9 +54,7 @@ class Store:
             if result is None:
                 continue
             if result.version != version():
-                message = (
-                    f"is of dqslam {result.version}, this is {version()}: start anew elsewhere"
-                )
+                message = f"is of dqslam {result.version}, not {version()}: start anew elsewhere"
                 raise FileError(self._path(key), message)
             found[key] = result
         return found
