@@ -5,7 +5,7 @@ A command's module imports nothing heavy but inside its functions: `dqslam --hel
 
 import sys
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Annotated, Any
 
 import typer
 
@@ -18,6 +18,7 @@ from dqslam.cli.evaluate import evaluate
 from dqslam.cli.inspect import inspect
 from dqslam.cli.paper import paper
 from dqslam.cli.run import run
+from dqslam.cli.settings import version
 from dqslam.cli.simulate import simulate
 from dqslam.cli.sweep import sweep
 from dqslam.cli.view import view
@@ -39,11 +40,28 @@ EXIT_CODES = {
 
 app = typer.Typer(
     name="dqslam",
-    help="Object SLAM with dual quadrics.",
-    epilog="Exit codes: " + "; ".join(f"{code} {why}" for code, why in EXIT_CODES.items()) + ".",
+    epilog="Exit codes\n\n" + "\n".join(f"{code}: {why}" for code, why in EXIT_CODES.items()),
     no_args_is_help=True,
     pretty_exceptions_enable=False,
 )
+
+
+def _say_version(asked: bool) -> None:
+    if asked:
+        typer.echo(f"dqslam {version() or '(not installed)'}")
+        raise typer.Exit
+
+
+@app.callback()
+def _dqslam(
+    _: Annotated[
+        bool,
+        typer.Option("--version", is_eager=True, callback=_say_version, help="Say which it is."),
+    ] = False,
+) -> None:
+    """Object SLAM with dual quadrics: objects and trajectory from odometry and boxes."""
+
+
 for _panel, _commands in COMMANDS.items():
     for _command in _commands:
         app.command(rich_help_panel=_panel)(_command)
