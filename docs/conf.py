@@ -74,6 +74,8 @@ sphinx_gallery_conf = {
     "abort_on_example_error": True,
     "download_all_examples": False,
     "show_memory": False,
+    "show_signature": False,
+    "write_computation_times": False,
     "min_reported_time": 1000,
     "backreferences_dir": None,
     "remove_config_comments": True,

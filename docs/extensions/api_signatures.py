@@ -63,9 +63,9 @@ def _keep(
 def _restore(
     app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]
 ) -> None:
-    """Give an attribute its docstring back."""
+    """Give an attribute its docstring back; |x| is an absolute value, not a substitution."""
     if what in _ATTRIBUTES:
-        lines[:] = _kept.pop(name)
+        lines[:] = [line.replace("|", r"\|") for line in _kept.pop(name)]
 
 
 def setup(app: Sphinx) -> dict[str, bool]:

@@ -41,7 +41,7 @@ class _Repository:
         """Lead links, relative to a folder, to pages of the site, relative to another page."""
 
         def new_link(match: re.Match[str]) -> str:
-            target = (folder / match[2]).resolve()
+            target = Path(os.path.normpath(folder / match[2]))
             page_of = self._page_of(target)
             if page_of is None:
                 return match[0]

@@ -38,8 +38,7 @@ TEST(RangeCost, JacobiansMatchPerturbation) {
 
 TEST(RangeCost, FailsAtTheCentre) {
   const CostPointer cost(Cost::Create(1.0, 0.1));
-  EXPECT_FALSE(
-      IsDefined(*cost, {PoseBlock<Se2>({1, 2, 0}), LandmarkBlock(SphereAt({1, 2, 0}))}));
+  EXPECT_FALSE(IsDefined(*cost, {PoseBlock<Se2>({1, 2, 0}), LandmarkBlock(SphereAt({1, 2, 0}))}));
 }
 
 TEST(RangeCost, FourRangesFindAnObject) {
