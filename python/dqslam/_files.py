@@ -46,9 +46,12 @@ def write_text(path: str | Path, parts: str | Iterable[str]) -> None:
 
 @contextlib.contextmanager
 def whole_file(path: str | Path) -> Iterator[Path]:
-    """Give a temporary name that becomes ``path`` if all goes well: nobody sees half a file."""
+    """Give a temporary name that becomes ``path`` if all goes well: nobody sees half a file.
+
+    It has the same suffix, by which some writers choose the format.
+    """
     path = Path(path)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    temporary = path.with_name(f".{path.stem}.{os.getpid()}.tmp{path.suffix}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         yield temporary

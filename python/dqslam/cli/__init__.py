@@ -17,6 +17,7 @@ from dqslam.cli.demo import demo
 from dqslam.cli.evaluate import evaluate
 from dqslam.cli.inspect import inspect
 from dqslam.cli.paper import paper
+from dqslam.cli.plot import plot
 from dqslam.cli.run import run
 from dqslam.cli.settings import version
 from dqslam.cli.simulate import simulate
@@ -27,7 +28,7 @@ from dqslam.cli.view import view
 COMMANDS: dict[str, tuple[Callable[..., None], ...]] = {
     "Start here": (demo, paper, simulate),
     "Your recording": (inspect, convert, run, evaluate),
-    "Look": (view,),
+    "Look": (plot, view),
     "Study": (sweep, ablation, degeneracy),
 }
 EXIT_CODES = {

@@ -1,3 +1,5 @@
 """Figures. Nothing here computes results: the numbers come from the layers below."""
 
 from dqslam.plot.maps import plot_maps as plot_maps
+from dqslam.plot.results import Drawn as Drawn
+from dqslam.plot.results import plot_results as plot_results

@@ -1,0 +1,241 @@
+"""``dqslam plot``: figures of results or of a sweep, and outlines over images."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from dqslam.cli.options import FrameRate, FrameTimesFile
+from dqslam.cli.output import Json, Output, Quiet
+from dqslam.cli.results import results_directory
+
+if TYPE_CHECKING:
+    from dqslam.io import FrameTimes, Results
+
+_STILLS = 9  # spread evenly, where no frames are asked for
+
+
+def plot(
+    directory: Annotated[
+        Path,
+        typer.Argument(
+            metavar="DIR", help="What `dqslam run`, `dqslam simulate` or `dqslam sweep` wrote."
+        ),
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Directory of the figures. Default: DIR/figures."),
+    ] = None,
+    kind: Annotated[
+        Literal["svg", "png", "pdf"], typer.Option("--format", help="File format of the figures.")
+    ] = "svg",
+    groundtruth: Annotated[
+        Path | None,
+        typer.Option(
+            help="True trajectory, in any world. Default: groundtruth.txt in DIR or beside it."
+        ),
+    ] = None,
+    objects: Annotated[
+        Path | None,
+        typer.Option(help="CSV of true objects. Default: objects.csv beside groundtruth.txt."),
+    ] = None,
+    align: Annotated[
+        Literal["se3", "sim3", "se2", "none"],
+        typer.Option(help="Motion between both worlds: rigid, with scale, on the plane."),
+    ] = "se3",
+    images: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER",
+            help="Draw the outlines of the objects over these images too: by times that are their "
+            "names, by order, or by --frame-times.",
+        ),
+    ] = None,
+    frames: Annotated[
+        str | None,
+        typer.Option(
+            metavar="POSES",
+            help="Which of them, counted from 0: 0,17,100-200, or 0-1000:10 for every tenth. "
+            f"Default: {_STILLS} spread evenly, of a film all.",
+        ),
+    ] = None,
+    frame_times: FrameTimesFile = None,
+    frame_rate: FrameRate = None,
+    video: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Make a film of them instead: .mp4 (needs ffmpeg) or .gif."
+        ),
+    ] = None,
+    video_rate: Annotated[
+        float | None,
+        typer.Option(
+            metavar="HZ", min=0.1, max=120.0, help="Its frames per second. Default: as it was."
+        ),
+    ] = None,
+    parameter: Annotated[
+        str | None,
+        typer.Option(help="Of a sweep: the setting to draw along. Default: the first varied."),
+    ] = None,
+    quiet: Quiet = False,
+    json: Json = False,
+) -> None:
+    """Draw the results in DIR: the map from above, errors over time, residuals, boxes.
+
+    Needs `pip install 'dqslam[plot]'`. docs/figures.md says what each figure shows. Of a sweep, its
+    metrics against what was varied.
+    """
+    from dqslam import io
+
+    if find_spec("matplotlib") is None:
+        raise ValueError("figures need matplotlib: pip install 'dqslam[plot]'")
+    if images is None and (video is not None or frames is not None):
+        raise ValueError("--frames and --video are of --images, which is not given")
+    if video is not None:
+        from dqslam.plot.overlay import check_video
+
+        check_video(video)
+    output = Output(quiet=quiet, as_json=json)
+    out = directory / "figures" if out is None else out
+    left_out: dict[str, str] = {}
+    if _is_sweep(directory):
+        files = [_plot_sweep(directory, out, kind, parameter)]
+    else:
+        if parameter is not None:
+            raise ValueError(f"--parameter is of a sweep, which {directory} is not")
+        results = io.load_results(_results_in(directory))
+        if groundtruth is None:
+            groundtruth = _beside(results.directory, "groundtruth.txt")
+            if groundtruth is not None and objects is None:
+                objects = _beside(groundtruth.parent, "objects.csv", parent=False)
+        shown: dict[int, Path] = {}
+        if images is not None:  # before anything is written: can they be told apart?
+            times = _frame_times(frame_times, frame_rate)
+            shown = _choose(
+                frames, io.find_images(images, results.timestamps, times), is_film=video is not None
+            )
+        files, left_out = _plot_results(
+            results, out, kind, output, groundtruth=groundtruth, objects=objects, align=align
+        )
+        if images is not None:
+            files += _overlay(results, shown, out, video, video_rate, output)
+    for name, why in left_out.items():
+        output.line(f"no {name}: {why}")
+    for file in files:
+        output.line(f"wrote {file}")
+    output.document({"figures": [str(file) for file in files], "left_out": left_out})
+
+
+def _is_sweep(directory: Path) -> bool:
+    return (directory / "summary.json").is_file() and not (directory / "trajectory.txt").exists()
+
+
+def _results_in(directory: Path) -> Path:
+    """Return where the results are: of a simulated recording, in its folder of results."""
+    inside = directory / "results"
+    simulated = (directory / "odometry.txt").exists() and (inside / "trajectory.txt").exists()
+    return inside if simulated and not (directory / "trajectory.txt").exists() else directory
+
+
+def _beside(directory: Path, name: str, *, parent: bool = True) -> Path | None:
+    folders = (directory, directory.resolve().parent) if parent else (directory,)
+    return next((one / name for one in folders if (one / name).is_file()), None)
+
+
+def _frame_times(table: Path | None, rate: float | None) -> FrameTimes | None:
+    from dqslam import io
+
+    if table is not None and rate is not None:
+        raise ValueError("--frame-times and --frame-rate both say when a frame was taken")
+    if table is not None:
+        return io.read_frame_times(table)
+    return None if rate is None else io.frame_rate(rate)
+
+
+def _plot_sweep(directory: Path, out: Path, kind: str, parameter: str | None) -> Path:
+    from dqslam.plot.style import save_figure
+    from dqslam.plot.sweep import draw_sweep, read_summary
+
+    figure = draw_sweep(read_summary(directory), parameter)
+    path = out / f"sweep.{kind}"
+    save_figure(figure, path)
+    return path
+
+
+def _plot_results(
+    results: Results,
+    out: Path,
+    kind: str,
+    output: Output,
+    *,
+    groundtruth: Path | None,
+    objects: Path | None,
+    align: Literal["se3", "sim3", "se2", "none"],
+) -> tuple[list[Path], dict[str, str]]:
+    from dqslam import io
+    from dqslam.plot import plot_results
+
+    truth = None if groundtruth is None else io.read_trajectory(groundtruth, repeated_times=True)
+    true_objects = None if objects is None else io.read_true_objects(objects)
+    with output.waiting("drawing"), results_directory(out):
+        drawn = plot_results(
+            results, out, kind=kind, groundtruth=truth, objects=true_objects, align=align
+        )
+    return list(drawn.written), dict(drawn.left_out)
+
+
+def _overlay(
+    results: Results,
+    images: dict[int, Path],
+    out: Path,
+    video: Path | None,
+    rate: float | None,
+    output: Output,
+) -> list[Path]:
+    """Write images, by their poses, with what the map has of them: the files."""
+    from dqslam.evaluate_results import fit_boxes
+    from dqslam.plot.overlay import Overlay, save_stills, save_video, usual_rate
+
+    overlay = Overlay(results, None if results.boxes is None else fit_boxes(results))
+    with output.share("images") as progress:
+        if video is None:
+            return save_stills(overlay, images, out / "images", progress)
+        rate = usual_rate(results.timestamps[list(images)]) if rate is None else rate
+        save_video(overlay, images, video, rate=rate, progress=progress)
+    return [video]
+
+
+def _choose(frames: str | None, images: dict[int, Path], *, is_film: bool) -> dict[int, Path]:
+    """Return the images that are asked for; without any asking all of a film, else a few."""
+    poses = sorted(images)
+    if frames is None and (is_film or len(poses) <= _STILLS):
+        return {pose: images[pose] for pose in poses}
+    if frames is None:
+        last = len(poses) - 1
+        return {
+            pose: images[pose]
+            for pose in (poses[round(at * last / (_STILLS - 1))] for at in range(_STILLS))
+        }
+    asked: set[int] = set()
+    for part in frames.split(","):
+        asked.update(_span(part.strip()))
+    chosen = {pose: images[pose] for pose in poses if pose in asked}
+    if not chosen:
+        raise ValueError(f"--frames: no image is of a pose among {frames}")
+    return chosen
+
+
+def _span(part: str) -> range:
+    """Return the poses of "7", "7-20" or "7-20:5", ends included."""
+    try:
+        ends, _, step = part.partition(":")
+        first, dash, last = ends.partition("-")
+        span = range(int(first), int(last if dash else first) + 1, int(step) if step else 1)
+    except ValueError:
+        span = range(0)
+    if not span:
+        raise ValueError(f"--frames: {part!r} is not like 7, 7-20 or 7-20:5")
+    return span

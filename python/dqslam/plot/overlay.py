@@ -1,0 +1,194 @@
+"""Outlines of the mapped ellipsoids over the images that a camera took."""
+
+import shutil
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dqslam._checks import Floats
+from dqslam._files import FileError, whole_file
+from dqslam.evaluate_results import BoxFits
+from dqslam.io import Results
+from dqslam.plot.frame import draw_boxes, visible_outlines
+from dqslam.plot.style import class_styles, column_style, new_figure, save_figure
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+VIDEOS = (".mp4", ".gif")
+_DPI = 100  # of the figure: an inch is so many pixels of the image
+_RATES = (1.0, 60.0)  # frames a second that can be watched
+_USUAL_RATE = 10.0
+_UNSEEN = (0, (3, 2))
+
+
+class Overlay:
+    """One image at a time, with what the map says of it.
+
+    Thick and named are the outlines of the ellipsoids that have a box in the image; those of the
+    others are dashed, as something may hide them. Thin are the boxes, white those of no object.
+    """
+
+    def __init__(self, results: Results, fits: BoxFits | None) -> None:
+        self._results = results
+        self._fits = fits
+        self._styles = class_styles(results.objects.class_name)
+        camera = results.camera
+        self._scale = max(camera.height / 480.0, 0.5)  # lines and names grow with the image
+        self.figure = new_figure(camera.width / _DPI, camera.height / _DPI)
+        self.figure.set_layout_engine("none")
+        self._axes = self.figure.add_axes((0.0, 0.0, 1.0, 1.0))
+
+    def draw(self, pose: int, image: Path) -> "Figure":
+        """Draw an image and the objects as seen from a pose; FileError if it is none of those."""
+        pixels = read_image(image)
+        camera, axes = self._results.camera, self._axes
+        height, width = pixels.shape[:2]
+        if (width, height) != (camera.width, camera.height):
+            raise FileError(
+                image,
+                f"is {width} x {height}, but the camera's are {camera.width} x {camera.height}",
+            )
+        axes.clear()
+        axes.set_axis_off()
+        axes.imshow(pixels, cmap="gray", interpolation="nearest", aspect="auto")
+        axes.set(xlim=(-0.5, width - 0.5), ylim=(height - 0.5, -0.5))
+        detected = np.zeros(0, dtype=np.int64)
+        if self._fits is not None:
+            detected = draw_boxes(
+                axes,
+                self._results,
+                self._fits,
+                pose,
+                self._styles,
+                lens=True,
+                linewidth=0.6 * self._scale,
+                unmapped="white",
+            )
+        rows, outlines = visible_outlines(self._results, pose, lens=True)
+        for row, outline in zip(rows, outlines, strict=True):
+            self._draw_object(axes, int(row), outline, is_detected=bool(np.isin(row, detected)))
+        return self.figure
+
+    def _draw_object(self, axes: "Axes", row: int, outline: Floats, *, is_detected: bool) -> None:
+        from matplotlib.patheffects import withStroke
+
+        objects, scale = self._results.objects, self._scale
+        color = self._styles[objects.class_name[row]]["color"]
+        dark = [withStroke(linewidth=2.6 * scale, foreground="black", alpha=0.5)]
+        axes.plot(
+            *outline.T,
+            color=color,
+            linewidth=(1.5 if is_detected else 1.0) * scale,
+            linestyle="-" if is_detected else _UNSEEN,
+            path_effects=dark if is_detected else None,
+            gid="outline",
+        )
+        if is_detected:
+            self._write_name(axes, f"{objects.class_name[row]} {objects.id[row]}", outline, color)
+
+    def _write_name(self, axes: "Axes", name: str, outline: Floats, color: str) -> None:
+        """Write a name above an outline, or as near to that as the image goes."""
+        camera, size = self._results.camera, 6.5 * self._scale
+        half = 0.33 * len(name) * size * _DPI / 72.0
+        low, high = np.nanmin(outline, axis=0), np.nanmax(outline, axis=0)
+        axes.text(
+            float(np.clip((low[0] + high[0]) / 2.0, half, max(camera.width - half, half))),
+            float(np.clip(low[1] - 2.0, 2.0 * size, camera.height - 4.0)),
+            name,
+            color="white",
+            fontsize=size,
+            ha="center",
+            va="bottom",
+            bbox={"facecolor": color, "alpha": 0.75, "linewidth": 0, "pad": 0.8},
+            clip_on=True,
+            gid="name",
+        )
+
+
+def read_image(path: Path) -> Any:
+    """Read the pixels of an image, shape (height, width) or (height, width, 3 or 4)."""
+    from matplotlib.image import imread
+
+    try:
+        return imread(path)
+    except (OSError, ValueError, SyntaxError) as error:  # what Pillow raises for what is no image
+        raise FileError(path, f"cannot be read as an image: {error}") from None
+
+
+def save_stills(
+    overlay: Overlay,
+    images: Mapping[int, Path],
+    folder: Path,
+    progress: Callable[[float], None] = lambda share: None,
+) -> list[Path]:
+    """Write images, by their poses, with their objects into a folder, as PNG of the same size."""
+    written = []
+    with column_style():
+        for done, (pose, image) in enumerate(images.items(), start=1):
+            path = folder / f"{image.stem}.png"
+            if path.exists() and path.samefile(image):
+                raise FileError(path, "is the image itself: it would be lost")
+            save_figure(overlay.draw(pose, image), path, dpi=_DPI)
+            written.append(path)
+            progress(done / len(images))
+    return written
+
+
+def save_video(
+    overlay: Overlay,
+    images: Mapping[int, Path],
+    path: Path,
+    *,
+    rate: float,
+    progress: Callable[[float], None] = lambda share: None,
+) -> None:
+    """Write images, by their poses, with their objects as a film, MP4 or GIF by its suffix.
+
+    ``rate`` is in frames a second. The file is whole or not there.
+
+    Raises
+    ------
+    FileError
+        For another suffix, for MP4 where there is no ffmpeg, or an image that cannot be read.
+    """
+    check_video(path)
+    with column_style(), whole_file(path) as temporary:
+        writer = _writer(path.suffix.lower(), rate)
+        with writer.saving(overlay.figure, str(temporary), dpi=_DPI):
+            for done, (pose, image) in enumerate(images.items(), start=1):
+                overlay.draw(pose, image)
+                writer.grab_frame()
+                progress(done / len(images))
+
+
+def check_video(path: Path) -> None:
+    """Raise FileError unless a film of this name can be written."""
+    if path.suffix.lower() not in VIDEOS:
+        raise FileError(path, f"its name ends in none of {', '.join(VIDEOS)}")
+    if path.suffix.lower() == ".mp4" and shutil.which("ffmpeg") is None:
+        raise FileError(path, "MP4 needs ffmpeg (apt-get install ffmpeg); .gif does without")
+
+
+def usual_rate(timestamps: Floats) -> float:
+    """Return the frames a second at which poses of these times, (n,) s, are seen as they went by.
+
+    10 where that could not be watched, as with time stamps that only count.
+    """
+    if len(timestamps) < 2:
+        return _USUAL_RATE
+    rate = 1.0 / float(np.median(np.diff(timestamps)))
+    return rate if _RATES[0] < rate <= _RATES[1] else _USUAL_RATE
+
+
+def _writer(suffix: str, rate: float) -> Any:
+    from matplotlib.animation import FFMpegWriter, PillowWriter
+
+    if suffix == ".gif":
+        return PillowWriter(fps=rate)  # type: ignore[arg-type]
+    # H.264 as browsers show it wants even sides.
+    even = ["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p", "-loglevel", "error"]
+    return FFMpegWriter(fps=rate, codec="libx264", extra_args=even)  # type: ignore[arg-type]

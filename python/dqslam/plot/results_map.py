@@ -1,0 +1,259 @@
+"""The map of a directory of results, seen from above."""
+
+from collections import Counter
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dqslam._checks import Floats
+from dqslam.evaluate import Alignment
+from dqslam.io import MapObjects, Results, TrueObjects
+from dqslam.plot.above import FromAbove, from_above, outline
+from dqslam.plot.gaps import break_at_gaps
+from dqslam.plot.labels import place_labels
+from dqslam.plot.style import (
+    COLUMN_INCHES,
+    ESTIMATE,
+    ODOMETRY,
+    TRUTH,
+    class_styles,
+    column_style,
+    new_figure,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_SIGMAS = 2.0
+_POSE_ELLIPSES = 12
+_NAMED_BY_CLASS = 12  # where there are more objects, they are numbers, and the legend has classes
+_WIDTH = 2.8  # inches of the map
+_RATIOS = (0.35, 1.35)  # of its height to its width, at least and at most
+_LEGEND_COLUMNS = 4
+_MARGIN = 0.06  # of the size, around
+_LOST = 0.5  # of the size: what odometry and objects may add to each side of the paths
+_ODOMETRY_PATH: dict[str, Any] = {"color": ODOMETRY, "linewidth": 0.8, "label": "odometry"}
+_ESTIMATED_PATH: dict[str, Any] = {"color": ESTIMATE, "linewidth": 0.9, "label": "estimate"}
+_TRUE_PATH: dict[str, Any] = {"color": TRUTH, "linewidth": 2.4, "alpha": 0.5, "label": "truth"}
+
+
+@dataclass(frozen=True, eq=False)
+class MapTruth:
+    """What is true, in its own world, and how the estimate gets there."""
+
+    timestamps: Floats
+    """Of the poses, seconds, shape (n,)."""
+    world_from_camera: Floats
+    """True poses, shape (n, 7)."""
+    objects: TrueObjects | None
+    alignment: Alignment
+    """true_from_estimated."""
+
+
+def draw_results_map(results: Results, truth: MapTruth | None = None) -> "Figure":
+    """Draw odometry, estimate, objects by class, uncertainty of 2 sigma, and the truth if known.
+
+    With the truth all is in its world: odometry and estimate are moved alike. Objects are outlines
+    from above, dotted the covariance of their centres; one that is no ellipsoid is a cross.
+    """
+    move = Alignment(np.eye(3), np.zeros(3)) if truth is None else truth.alignment
+    estimate, odometry = (
+        move.apply_poses(poses) for poses in (results.world_from_camera, results.odometry)
+    )
+    view = from_above(estimate if truth is None else truth.world_from_camera)
+    styles = class_styles(results.objects.class_name)
+    true_outlines = [] if truth is None else _true_outlines(view, truth.objects)
+    outlines = _outlines(view, results.objects, move)
+    paths = [view.points(estimate[:, :3])]
+    if truth is not None:
+        paths.append(view.points(truth.world_from_camera[:, :3]))
+    low, high = _window(paths, [view.points(odometry[:, :3]), *(o.T for o in outlines)])
+    with column_style():
+        width, height = high - low
+        rows = -(-len(styles) // _LEGEND_COLUMNS) + 1
+        figure = new_figure(COLUMN_INCHES, _WIDTH * float(height / width) + 0.42 + 0.14 * rows)
+        axes = figure.subplots()
+        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
+        if view.downward:
+            axes.invert_yaxis()
+        axes.set(xlabel=view.labels[0], ylabel=view.labels[1])
+        axes.grid(alpha=0.25, linewidth=0.4)
+        if truth is not None:
+            axes.plot(*_true_path(view, truth).T, gid="truth", **_TRUE_PATH)
+        axes.plot(*view.points(odometry[:, :3]).T, gid="odometry", **_ODOMETRY_PATH)
+        axes.plot(*view.points(estimate[:, :3]).T, gid="estimate", **_ESTIMATED_PATH)
+        axes.plot(*view.points(estimate[:1, :3]).T, "o", color="black", markersize=2.5, zorder=3)
+        _draw_pose_ellipses(axes, view, results, estimate, move.scale)
+        for one in true_outlines:
+            axes.fill(*one, facecolor=TRUTH, alpha=0.35, linewidth=0, zorder=1.5)
+        _draw_objects(axes, view, results.objects, move, outlines, styles)
+        _draw_legend(figure, styles, results, truth)
+        place_labels(
+            axes,
+            outlines,
+            _names(results.objects),
+            [styles[name]["color"] for name in results.objects.class_name],
+            size=6.0 if len(outlines) <= _NAMED_BY_CLASS else 5.0,
+        )
+    return figure
+
+
+def _window(paths: list[Floats], others: list[Floats]) -> tuple[Floats, Floats]:
+    """Return the corners (2,) of what is shown: the paths, and what is not far from them."""
+    every = np.vstack(paths)
+    low, high = every.min(axis=0), every.max(axis=0)
+    beyond = _LOST * max(float((high - low).max()), 1e-3)
+    near_low, near_high = low - beyond, high + beyond
+    for points in others:
+        low = np.minimum(low, points.min(axis=0).clip(min=near_low))
+        high = np.maximum(high, points.max(axis=0).clip(max=near_high))
+    low, high = low - _MARGIN * (high - low).max(), high + _MARGIN * (high - low).max()
+    width, height = high - low
+    wanted = np.array(
+        [max(width, height / _RATIOS[1]), max(height, width * _RATIOS[0])], dtype=float
+    )
+    wider = (wanted - (high - low)) / 2.0
+    return low - wider, high + wider
+
+
+def _true_path(view: FromAbove, truth: MapTruth) -> Floats:
+    """Return the true path (n, 2), with a point of NaN in each gap."""
+    return break_at_gaps(truth.timestamps, view.points(truth.world_from_camera[:, :3]))[1]
+
+
+def _outlines(view: FromAbove, objects: MapObjects, move: Alignment) -> list[Floats]:
+    """Return the outline of each object (2, n); a point where it is no ellipsoid."""
+    centers = move.apply(objects.center)
+    found = []
+    for row, center in enumerate(centers):
+        if objects.is_ellipsoid[row]:
+            axes = _turns(objects.orientation_xyzw[row]) * (move.scale * objects.semi_axes[row])
+            axes = move.rotation @ axes
+            found.append(view.outline(center, axes @ axes.T))
+        else:
+            found.append(view.points(center[None]).T)
+    return found
+
+
+def _true_outlines(view: FromAbove, objects: TrueObjects | None) -> list[Floats]:
+    """Return what is known of true objects: the inscribed ellipsoid, or nothing of its size."""
+    if objects is None or objects.size is None:
+        return []
+    turns = np.tile(np.eye(3), (len(objects), 1, 1))
+    if objects.rotation is not None:
+        turns = objects.rotation
+    axes = turns * (0.5 * objects.size[:, None])
+    shapes = axes @ axes.swapaxes(1, 2)
+    pairs = zip(objects.center[objects.static], shapes[objects.static], strict=True)
+    return [view.outline(center, shape) for center, shape in pairs]
+
+
+def _turns(xyzw: Floats) -> Floats:
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.from_quat(xyzw).as_matrix())
+
+
+def _draw_pose_ellipses(
+    axes: "Axes", view: FromAbove, results: Results, estimate: Floats, scale: float
+) -> None:
+    known = np.flatnonzero(np.isfinite(results.covariance).all(axis=(1, 2)))
+    if not known.size:
+        return
+    evenly = np.unique(np.linspace(0, len(known) - 1, _POSE_ELLIPSES + 1).astype(int)[1:])
+    for row in known[evenly]:
+        turn = _turns(estimate[row, 3:])
+        spread = (_SIGMAS * scale) ** 2 * turn @ results.covariance[row, :3, :3] @ turn.T
+        axes.plot(
+            *view.outline(estimate[row, :3], spread),
+            color=ESTIMATE,
+            linewidth=0.5,
+            alpha=0.9,
+            gid="pose covariance",
+        )
+
+
+def _draw_objects(
+    axes: "Axes",
+    view: FromAbove,
+    objects: MapObjects,
+    move: Alignment,
+    outlines: list[Floats],
+    styles: dict[str, dict[str, Any]],
+) -> None:
+    for row, one in enumerate(outlines):
+        style = styles[objects.class_name[row]]
+        if one.shape[1] == 1:
+            axes.plot(*one, "x", color=style["color"], markersize=4, gid="object")
+            continue
+        axes.fill(*one, facecolor=style["color"], alpha=0.25, linewidth=0, zorder=2.5)
+        axes.plot(*one, linewidth=0.9, zorder=2.6, gid="object", **style)
+        covariance = objects.center_covariance[row]
+        if np.isfinite(covariance).all():
+            turned = _SIGMAS**2 * move.scale**2 * move.rotation @ covariance @ move.rotation.T
+            (center,) = move.apply(objects.center[[row]])
+            flat = view.axes @ turned @ view.axes.T
+            axes.plot(
+                *outline(view.axes @ center, flat),
+                color="0.2",
+                linewidth=0.5,
+                linestyle=":",
+                zorder=2.7,
+                gid="object covariance",
+            )
+
+
+def _draw_legend(
+    figure: "Figure",
+    styles: dict[str, dict[str, Any]],
+    results: Results,
+    truth: MapTruth | None,
+) -> None:
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    handles: list[Any] = [
+        Line2D([], [], **_ODOMETRY_PATH),
+        Line2D([], [], **_ESTIMATED_PATH),
+    ]
+    if truth is not None:
+        handles.append(Line2D([], [], **_TRUE_PATH))
+    spread = (
+        np.isfinite(results.covariance).any()
+        or np.isfinite(results.objects.center_covariance).any()
+    )
+    if spread:
+        dots = Line2D([], [], color="0.2", linewidth=0.6, linestyle=":", label="2σ")
+        handles.append(dots)
+    blank = Line2D([], [], linewidth=0.0, label=" ")
+    handles += [blank] * (_LEGEND_COLUMNS - len(handles))
+    handles += [
+        Patch(
+            facecolor=(str(style["color"]), 0.25),
+            edgecolor=str(style["color"]),
+            linestyle=style["linestyle"],
+            label=name,
+        )
+        for name, style in styles.items()
+    ]
+    handles += [blank] * (-len(handles) % _LEGEND_COLUMNS)
+    by_column = [one for at in range(_LEGEND_COLUMNS) for one in handles[at::_LEGEND_COLUMNS]]
+    figure.legend(
+        handles=by_column,
+        loc="outside lower center",
+        ncols=_LEGEND_COLUMNS,
+        frameon=False,
+        borderpad=0.1,
+        labelspacing=0.3,
+    )
+
+
+def _names(objects: MapObjects) -> list[str]:
+    """Return what is written beside each object: its class, and its id where that is not enough."""
+    if len(objects) > _NAMED_BY_CLASS:
+        return [str(number) for number in objects.id]
+    count = Counter(objects.class_name)
+    pairs = zip(objects.class_name, objects.id, strict=True)
+    return [name if count[name] == 1 else f"{name} {number}" for name, number in pairs]

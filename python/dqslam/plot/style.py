@@ -1,0 +1,82 @@
+"""How all figures look: colours that the colour-blind can tell apart, sizes, files."""
+
+import contextlib
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from dqslam._files import FileError, whole_file
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+# Okabe and Ito. The paths have the paper's colours.
+BLUE, ORANGE, GREEN, VERMILLION = "#0072B2", "#E69F00", "#009E73", "#D55E00"
+SKY, PURPLE, YELLOW, GREY = "#56B4E9", "#CC79A7", "#F0E442", "#808080"
+ODOMETRY, TRUTH, ESTIMATE = BLUE, GREEN, VERMILLION
+# Of classes: first those that no path has.
+_CLASS_COLORS = (PURPLE, ORANGE, SKY, GREEN, BLUE, VERMILLION, YELLOW)
+_CLASS_LINES = ("-", (0, (4, 1)), (0, (1.5, 0.8)))
+
+COLUMN_INCHES = 3.3
+FORMATS = ("svg", "png", "pdf")
+_DPI = 300
+_RC = {
+    "font.size": 7.0,
+    "axes.titlesize": 7.5,
+    "axes.labelsize": 7.0,
+    "xtick.labelsize": 6.5,
+    "ytick.labelsize": 6.5,
+    "legend.fontsize": 6.5,
+    "legend.handlelength": 1.6,
+    "legend.columnspacing": 1.0,
+    "axes.linewidth": 0.6,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "lines.linewidth": 1.0,
+    "pdf.fonttype": 42,  # text stays text
+    "svg.hashsalt": "dqslam",  # the same figure is the same file
+}
+_NO_DATE = {"svg": {"Date": None}, "pdf": {"CreationDate": None}, "png": None}
+
+
+@contextlib.contextmanager
+def column_style() -> Iterator[None]:
+    """Draw and save in the sizes of a column of text."""
+    from matplotlib import rc_context
+
+    with rc_context(_RC):  # type: ignore[arg-type]
+        yield
+
+
+def new_figure(width: float, height: float) -> "Figure":
+    """Return an empty figure of a size in inches, that no window shows."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def class_styles(class_names: Iterable[str]) -> dict[str, dict[str, Any]]:
+    """Return colour and line style of each class; names are one per object, frequent ones first."""
+    styles: dict[str, dict[str, Any]] = {}
+    for place, (name, _) in enumerate(Counter(class_names).most_common()):
+        turn, color = divmod(place, len(_CLASS_COLORS))
+        styles[name] = {
+            "color": _CLASS_COLORS[color],
+            "linestyle": _CLASS_LINES[turn % len(_CLASS_LINES)],
+        }
+    return styles
+
+
+def save_figure(figure: "Figure", path: str | Path, *, dpi: float = _DPI) -> None:
+    """Write a figure, whole or not at all, in the format that its suffix names."""
+    path = Path(path)
+    kind = path.suffix.lstrip(".").lower()
+    if kind not in FORMATS:
+        raise FileError(path, f"its name ends in none of {', '.join('.' + one for one in FORMATS)}")
+    with whole_file(path) as temporary:
+        figure.savefig(temporary, format=kind, dpi=dpi, metadata=_NO_DATE[kind])
