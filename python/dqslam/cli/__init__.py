@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from dqslam._files import FileErrors
+from dqslam._version import version
 from dqslam.cli.ablation import ablation
 from dqslam.cli.convert import convert
 from dqslam.cli.degeneracy import degeneracy
@@ -19,7 +20,6 @@ from dqslam.cli.inspect import inspect
 from dqslam.cli.paper import paper
 from dqslam.cli.plot import plot
 from dqslam.cli.run import run
-from dqslam.cli.settings import version
 from dqslam.cli.simulate import simulate
 from dqslam.cli.sweep import sweep
 from dqslam.cli.view import view
