@@ -107,6 +107,31 @@ def test_report_names_the_settings_and_what_was_dropped(files):
     assert (content["poses"], content["boxes"]["count"]) == (40, 160)
 
 
+def test_json_is_the_report(files, capsys):
+    assert call(files, *PERTURB, "--json") == 0
+    assert json.loads(capsys.readouterr().out) == report(files)
+
+
+def test_the_covariance_of_each_step_may_be_given(files, orbit, capsys):
+    """The same as one noise for all, where that is what it says."""
+    count = len(orbit.times)
+    upper = [0.01**2 if row == column else 0 for row in range(6) for column in range(row, 6)]
+    names = [f"c{row}{column}" for row in range(1, 7) for column in range(row, 7)]
+    rows = [[repr(float(time)), *map(str, upper)] for time in orbit.times[1:]]
+    path = files[0].parent / "steps.csv"
+    path.write_text("\n".join(",".join(row) for row in [["timestamp", *names], *rows]) + "\n")
+    given = ("--odometry-covariance", str(path))
+    assert call(files, *given) == 0
+    assert report(files)["odometry_noise"] == {"from": "given"}
+    written = (files[0].parent / "out" / "trajectory.txt").read_bytes()
+    assert call(files, "--odometry-noise", "translation=0.01,rotation=0.01") == 0
+    assert (files[0].parent / "out" / "trajectory.txt").read_bytes() == written
+    assert len(rows) == count - 1
+    capsys.readouterr()
+    assert call(files, *given, "--odometry-noise", "translation=0.01,rotation=0.01") == 2
+    assert "--odometry-covariance: the noise is given already" in capsys.readouterr().err
+
+
 def test_without_truth_no_error_is_claimed(files, capsys):
     assert call(files) == 0
     assert report(files)["trajectory_error"] is None

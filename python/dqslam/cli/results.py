@@ -31,7 +31,8 @@ def results_directory(path: Path) -> Iterator[None]:
 @contextmanager
 def uninterrupted() -> Iterator[None]:
     """Put off Ctrl-C until all files of a result are there, which belong together."""
-    if threading.current_thread() is not threading.main_thread():
+    in_main = threading.current_thread() is threading.main_thread()
+    if not in_main or signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
         yield
         return
     asked: list[int] = []
@@ -49,5 +50,6 @@ def draw_figure(output: Output, path: Path, draw: Callable[[Path], None]) -> Non
     if find_spec("matplotlib") is None:
         output.line(f"no {path.name}: matplotlib is missing (pip install 'dqslam[plot]')")
         return
-    draw(path)
+    with output.waiting("drawing"):
+        draw(path)
     output.line(f"wrote {path}")
