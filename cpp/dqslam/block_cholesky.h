@@ -1,9 +1,11 @@
 // Cholesky factorisation of a symmetric positive definite BlockMatrix.
 #pragma once
 
-#include <Eigen/SparseCholesky>
+#include <Eigen/Core>
+#include <vector>
 
 #include "dqslam/block_matrix.h"
+#include "dqslam/elimination.h"
 
 namespace dqslam {
 
@@ -22,7 +24,11 @@ class BlockCholesky {
   Eigen::VectorXd Solve(const Eigen::VectorXd& b) const;
 
  private:
-  Eigen::SimplicialLLT<Eigen::SparseMatrix<double>> factor_;
+  void Assemble(const BlockMatrix& A, const Front& front, const Front& end);
+
+  Elimination elimination_;
+  std::vector<double> factor_;
+  std::vector<double> stacks_[2];
 };
 
 }  // namespace dqslam
