@@ -1,12 +1,11 @@
 """``dqslam paper``: the paper's table and figure."""
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from dqslam.cli.options import FirstSeed, Jobs, ResultDirectory
+from dqslam.cli.options import BackendName, FirstSeed, Jobs, ResultDirectory, Scheduler
 from dqslam.cli.output import Json, Output, Quiet
 from dqslam.cli.results import draw_figure, results_directory, uninterrupted
 from dqslam.cli.settings import CONFIG, ConfigFile, save_settings
@@ -86,6 +85,8 @@ def paper(
         typer.Option(help="Robust loss on boxes. Default: none, or gnc_gm with wrong ids."),
     ] = None,
     jobs: Jobs = None,
+    backend: BackendName = None,
+    scheduler: Scheduler = None,
     config: ConfigFile = None,
     quiet: Quiet = False,
     json: Json = False,
@@ -115,7 +116,9 @@ def paper(
             method=method,
             loss=loss,
             bound=bound,
-            jobs=jobs or os.cpu_count() or 1,
+            jobs=jobs,
+            backend=backend,
+            scheduler=scheduler,
             progress=progress,
         )
     output.table(_results(table))

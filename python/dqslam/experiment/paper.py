@@ -34,7 +34,7 @@ def run_paper(
     method: Method,
     loss: LossName | None = None,
     bound: bool = False,
-    jobs: int = 1,
+    jobs: int | None = 1,
     backend: Backend | None = None,
     scheduler: str | None = None,
     progress: Progress | None = None,
@@ -54,7 +54,7 @@ def run_paper(
     progress
         Called with (trials done, trials) after each.
     """
-    for name, value, least in (("trials", trials, 1), ("seed", seed, 0), ("jobs", jobs, 1)):
+    for name, value, least in (("trials", trials, 1), ("seed", seed, 0)):
         if value < least:
             raise ValueError(f"{name}: expected {least} or more, got {value}")
     settings = Settings(method, loss or default_loss(scenario, method), bound)
