@@ -36,7 +36,7 @@ def start_browser():
 
 @contextmanager
 def open_page(browser, address):
-    """Give the page at an address; a mistake in its scripts, or a request elsewhere, is an error."""
+    """Give the page at an address; mistakes in its scripts and requests elsewhere are errors."""
     home = address.rsplit("/", 1)[0] if address.startswith("file:") else address.rstrip("/")
     mistakes, requests = [], []
     page = browser.new_page(viewport={"width": 1280, "height": 800})

@@ -197,7 +197,8 @@ def test_outlines_on_the_page_are_those_of_the_core(page, scene):
     outlines = page.evaluate(
         """() => scene.estimate.map((pose) => scene.objects.map((object) => {
           const shape = geometry.shapeOf(object.semiAxes, object.orientation);
-          const found = geometry.outlineOf(geometry.viewOf(pose), scene.camera, object.center, shape);
+          const view = geometry.viewOf(pose);
+          const found = geometry.outlineOf(view, scene.camera, object.center, shape);
           return found && [found.u - found.halfWidth, found.v - found.halfHeight,
                            found.u + found.halfWidth, found.v + found.halfHeight];
         }))"""

@@ -17,6 +17,7 @@ from dqslam.view.scene import ESTIMATE, ODOMETRY, TRUTH, Scene, SceneObject, rgb
 if TYPE_CHECKING:
     from viser import ViserServer
 
+FIELD_OF_VIEW = np.radians(60.0)  # of the eye, vertical
 _CAMERAS = 60  # drawn at most
 _NOTHING = "nothing"
 _HERE = ("127.0.0.1", "0.0.0.0", "::1", "::")
@@ -54,14 +55,14 @@ class _Page:
         self.server, self.scene = server, scene
         self.frame = 0
         self.selected: int | None = None
-        self.radius = _place_eye(server, scene)
+        self._look()
         parents = {
-            "estimate": self._path("estimate", (scene.estimate,), ESTIMATE),
-            "odometry": self._path("odometry", (scene.odometry,), ODOMETRY),
+            "estimate": self._path("estimate", (scene.estimate,), ESTIMATE, 4.0),
+            "odometry": self._path("odometry", (scene.odometry,), ODOMETRY, 3.0),
         }
         if scene.truth:
             parents["truth"] = self._group("truth")
-            self._path("truth/path", scene.truth, TRUTH)
+            self._path("truth/path", scene.truth, TRUTH, 2.0)
             for row, one in enumerate(scene.true_objects):
                 _ellipsoid(server, f"/truth/objects/{row}", one, TRUTH, wireframe=True, opacity=0.5)
         parents["cameras"] = self._cameras()
@@ -72,13 +73,20 @@ class _Page:
         self._controls(parents)
         self._show()
 
+    def _look(self) -> None:
+        self.server.scene.set_up_direction(self.scene.up)
+        self.server.scene.world_axes.visible = False
+        eye = self.server.initial_camera
+        eye.position, eye.look_at, self.radius = place_eye(self.scene)
+        eye.fov, eye.near, eye.far = FIELD_OF_VIEW, 0.002 * self.radius, 100.0 * self.radius
+
     def _group(self, name: str) -> Any:
         return self.server.scene.add_frame(f"/{name}", show_axes=False)
 
-    def _path(self, name: str, runs: tuple[Floats, ...], color: str) -> Any:
+    def _path(self, name: str, runs: tuple[Floats, ...], color: str, pixels: float) -> Any:
         segments = np.vstack([np.stack([run[:-1, :3], run[1:, :3]], axis=1) for run in runs])
         return self.server.scene.add_line_segments(
-            f"/{name}", segments, rgb(color), thickness=3.0, thickness_units="screen"
+            f"/{name}", segments, rgb(color), thickness=pixels, thickness_units="screen"
         )
 
     def _cameras(self) -> Any:
@@ -179,8 +187,8 @@ class _Page:
             self.numbers.content = "" if chosen is None else _table(chosen.numbers)
 
 
-def _place_eye(server: ViserServer, scene: Scene) -> float:
-    """Look at the whole path from above and beside it; return how far it reaches, metres."""
+def place_eye(scene: Scene) -> tuple[Floats, Floats, float]:
+    """Return where to look from and at, (3,) each, to see all, and how far that reaches, metres."""
     points = scene.estimate[:, :3]
     low, high = points.min(axis=0), points.max(axis=0)
     if scene.objects:
@@ -194,13 +202,7 @@ def _place_eye(server: ViserServer, scene: Scene) -> float:
     beside = np.cross(along, scene.up)
     length = float(np.linalg.norm(beside))
     beside = beside / length if length > 1e-6 else np.roll(scene.up, 1)
-    server.scene.set_up_direction(scene.up)
-    server.scene.world_axes.visible = False
-    eye = server.initial_camera
-    eye.position = middle + radius * (1.3 * beside + 0.9 * scene.up)
-    eye.look_at = middle
-    eye.near, eye.far = 0.002 * radius, 100.0 * radius
-    return radius
+    return middle + radius * (1.3 * beside + 0.9 * scene.up), middle, radius
 
 
 def _ellipsoid(
