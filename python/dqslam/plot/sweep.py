@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dqslam.io import FileError
+from dqslam._checks import Floats
+from dqslam._files import FileError
 from dqslam.plot.style import (
     BLUE,
     COLUMN_INCHES,
@@ -29,8 +31,38 @@ SUMMARY = "summary.json"
 _COLORS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY)
 _MARKERS = "os^Dvp"
 _LOG_FROM = 20.0  # times the least: so wide a range is drawn in decades
-# What is drawn where nothing is asked for, as far as it was measured.
-_SHOWN = ("rmse_pos", "rmse_landmark")
+_MOST_SERIES = 6
+_APART = 0.012  # of the axis, between the points of two series
+# What is drawn, as far as it was measured; else the first two metrics.
+_SHOWN = {"rmse_pos": "positions", "rmse_landmark": "centres"}
+
+
+@dataclass(frozen=True)
+class _Places:
+    """Where the values of a parameter lie along the axis: numbers, or names side by side."""
+
+    names: list[str] | None
+    in_decades: bool
+    span: float
+    """Of the axis; of logarithms where it is in decades."""
+    series: int
+
+    @classmethod
+    def of(cls, values: list[Any], series: int) -> _Places:
+        if not all(isinstance(one, int | float) and not isinstance(one, bool) for one in values):
+            names = list(dict.fromkeys(map(str, values)))
+            return cls(names, False, float(len(names)), series)
+        low, high = float(min(values)), float(max(values))
+        in_decades = low > 0.0 and high >= _LOG_FROM * low
+        return cls(None, in_decades, np.log(high / low) if in_decades else high - low, series)
+
+    def at(self, values: list[Any], number: int) -> Floats:
+        """Return where values of one of the series are drawn, beside those of the others."""
+        shift = _APART * self.span * (number - (self.series - 1) / 2.0)
+        if self.names is not None:
+            return np.array([self.names.index(str(one)) for one in values]) + 4.0 * shift
+        x = np.array(values, dtype=float)
+        return x * np.exp(shift) if self.in_decades else x + shift
 
 
 def read_summary(folder: Path) -> dict[str, Any]:
@@ -53,8 +85,8 @@ def read_summary(folder: Path) -> dict[str, Any]:
 def draw_sweep(summary: dict[str, Any], parameter: str | None = None) -> Figure:
     """Draw the median of each metric against a parameter, the first by default, a line a series.
 
-    A series is all cells that are alike in the other parameters. Bars are the confidence intervals
-    of the medians.
+    A series is all cells that are alike in the other parameters; more than six become one of points
+    alone. Bars are the confidence intervals of the medians.
 
     Raises
     ------
@@ -71,16 +103,20 @@ def draw_sweep(summary: dict[str, Any], parameter: str | None = None) -> Figure:
     for cell in summary["cells"]:
         label = ", ".join(f"{_short(name)} {cell['values'][name]}" for name in others)
         series.setdefault(label, []).append(cell)
+    is_cloud = len(series) > _MOST_SERIES
+    if is_cloud:
+        series = {"": summary["cells"]}
     with column_style():
         figure = new_figure(COLUMN_INCHES, 0.5 + 1.5 * len(metrics) + 0.14 * len(series))
         grid = figure.subplots(len(metrics), 1, sharex=True, squeeze=False)[:, 0]
         for axes, metric in zip(grid, metrics, strict=True):
-            _draw_metric(axes, series, parameter, metric)
+            _draw_metric(axes, series, parameter, metric, is_cloud=is_cloud)
             unit = summary["units"][metric]
-            axes.set_ylabel(f"{metric} [{unit}]" if unit else metric)
+            name = _SHOWN.get(metric, metric.replace("_", " "))
+            axes.set_ylabel(f"{name} [{unit}]" if unit else name)
             axes.grid(alpha=0.25, linewidth=0.4)
         grid[-1].set_xlabel(parameter)
-        if others:
+        if len(series) > 1:
             handles, labels = grid[0].get_legend_handles_labels()
             figure.legend(handles, labels, loc="outside lower center", frameon=False, borderpad=0.1)
         title = f"median of {summary['trials']} trials, {summary['confidence']:.0%} intervals"
@@ -89,42 +125,47 @@ def draw_sweep(summary: dict[str, Any], parameter: str | None = None) -> Figure:
 
 
 def _draw_metric(
-    axes: Axes, series: dict[str, list[dict[str, Any]]], parameter: str, metric: str
+    axes: Axes,
+    series: dict[str, list[dict[str, Any]]],
+    parameter: str,
+    metric: str,
+    *,
+    is_cloud: bool,
 ) -> None:
     every = [cell["values"][parameter] for cells in series.values() for cell in cells]
-    numeric = all(isinstance(v, int | float) and not isinstance(v, bool) for v in every)
-    names = list(dict.fromkeys(map(str, every)))
-    highest, lowest = 0.0, np.inf
-    for place, (label, cells) in enumerate(series.items()):
+    place = _Places.of(every, len(series))
+    low, high = np.inf, -np.inf
+    for number, (label, cells) in enumerate(series.items()):
         found = [cell for cell in cells if metric in cell["metrics"]]
         if not found:
             continue
-        values = [cell["values"][parameter] for cell in found]
-        x = np.array(values if numeric else [names.index(str(value)) for value in values], float)
+        x = place.at([cell["values"][parameter] for cell in found], number)
         spreads = [cell["metrics"][metric] for cell in found]
         median = np.array([spread["median"] for spread in spreads], dtype=float)
         bounds = np.array([_bounds(spread) for spread in spreads]).T
         order = np.argsort(x, kind="stable")
+        joined = place.names is None and len(np.unique(x)) == len(x) and not is_cloud
         axes.errorbar(
-            (x if numeric else x + 0.08 * (place - (len(series) - 1) / 2.0))[order],
+            x[order],
             median[order],
             yerr=np.abs(bounds - median)[:, order],
-            color=_COLORS[place % len(_COLORS)],
-            marker=_MARKERS[place % len(_MARKERS)],
+            color=_COLORS[number % len(_COLORS)],
+            marker=_MARKERS[number % len(_MARKERS)],
             markersize=3.0,
-            linestyle="-" if numeric else "none",
+            linestyle="-" if joined else "none",
             linewidth=0.9,
             elinewidth=0.8,
             capsize=1.5,
             label=label,
         )
-        highest, lowest = max(highest, float(bounds.max())), min(lowest, float(bounds.min()))
-    if 0.0 < lowest < highest / _LOG_FROM:
+        low, high = min(low, float(bounds.min())), max(high, float(bounds.max()))
+    if 0.0 < low < high / _LOG_FROM:
         axes.set_yscale("log")
-    if not numeric:
-        axes.set_xticks(range(len(names)), names)
-    elif min(every) > 0 and max(every) >= _LOG_FROM * min(every):
+    if place.in_decades:
         axes.set_xscale("log")
+    if place.names is not None:
+        axes.set_xticks(range(len(place.names)), place.names)
+        axes.set_xlim(-0.5, len(place.names) - 0.5)
 
 
 def _bounds(spread: dict[str, Any]) -> tuple[float, float]:
