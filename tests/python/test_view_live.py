@@ -38,10 +38,13 @@ def scene(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def page(scene):
-    with start_browser() as browser, serve(scene, port=PORT) as address:
-        with open_page(browser, address) as page:
-            page.wait_for_selector("svg .box")
-            yield page
+    with (
+        start_browser() as browser,
+        serve(scene, port=PORT) as address,
+        open_page(browser, address) as page,
+    ):
+        page.wait_for_selector("svg .box")
+        yield page
 
 
 def test_the_boxes_of_the_image_and_the_objects_in_it(page):
