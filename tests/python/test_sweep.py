@@ -4,10 +4,12 @@ import csv
 import json
 import math
 import os
+import re
 import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -201,6 +203,17 @@ def test_a_wrong_file_is_refused(write, text, message):
         load_sweep(path)
     assert message in str(caught.value)
     assert str(caught.value).startswith(str(path))
+
+
+PAGE = (Path(__file__).parents[2] / "docs" / "sweeps.md").read_text(encoding="utf-8")
+
+
+def test_the_page_shows_a_file_that_is_right_and_has_all_metrics(write):
+    (text,) = re.findall(r"^```toml\n(.*?)^```$", PAGE, flags=re.MULTILINE | re.DOTALL)
+    sweep = load_sweep(write("samples = 10\n" + text))
+    assert len(sweep.cells) * len(sweep.seeds) == 3000
+    for name in trial_module.METRICS:
+        assert f"`{name}`" in PAGE
 
 
 # --- settings and trials -------------------------------------------------------------------------
