@@ -13,13 +13,16 @@ class FileError(ValueError):
 
     def __init__(self, path: str | Path, message: str, line: int | None = None) -> None:
         super().__init__(f"{path}: {message}" if line is None else f"{path}:{line}: {message}")
+        self.line = line
 
 
 class FileErrors(FileError):
-    """All that is wrong in a file, a line each."""
+    """All that is wrong in a file, a line each, in the order of the file."""
 
     def __init__(self, errors: Sequence[FileError]) -> None:
-        ValueError.__init__(self, "\n".join(map(str, errors)))
+        in_order = sorted(errors, key=lambda error: error.line or 0)
+        ValueError.__init__(self, "\n".join(map(str, in_order)))
+        self.line = in_order[0].line
         self.errors = tuple(errors)
 
 

@@ -130,11 +130,10 @@ def test_no_command_is_the_help(capsys):
     assert shown.err == ""
 
 
-def test_an_unknown_command_suggests_one(capsys):
+def test_an_unknown_command_is_one_line(capsys):
     assert main(["simulat"]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert "No such command 'simulat'" in line
-    assert "simulate" in line
 
 
 def test_the_version(capsys):

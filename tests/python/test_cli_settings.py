@@ -76,14 +76,7 @@ def test_all_mistakes_are_said_at_once_with_their_lines(settings, capsys):
     )
     assert main([*DEMO, *given]) == 2
     said = lines(capsys)
-    assert sorted(line.partition("my.toml:")[2][:2] for line in said) == [
-        "1:",
-        "2:",
-        "3:",
-        "4:",
-        "5:",
-        "6:",
-    ]
+    assert [line.partition("my.toml:")[2][0] for line in said] == list("123456")
     text = "\n".join(said)
     assert "my.toml:1: command: Input should be 'demo', not 'paper'" in text
     assert "my.toml:2: unknown key sead; did you mean seed?" in text

@@ -113,11 +113,11 @@ def test_all_mistakes_at_once_each_with_its_line(tmp_path):
     path = tmp_path / "s.toml"
     assert str(error.value).splitlines() == [
         f"{path}: trials is missing",
+        f"{path}:1: unknown key trails; did you mean trials?",
         f"{path}:2: names.1: Input should be a valid string, not 7",
         f"{path}:5: shape.radius_m: Input should be greater than 0, not -0.5",
         f"{path}:6: more.x.side_m is missing",
         f"{path}:8: unknown key more.x.sid_m; did you mean side_m?",
-        f"{path}:1: unknown key trails; did you mean trials?",
     ]
 
 
