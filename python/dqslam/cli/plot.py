@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from dqslam.cli.found import results_in, truth_of
 from dqslam.cli.options import FrameRate, FrameTimesFile
 from dqslam.cli.output import Json, Output, Quiet
 from dqslam.cli.results import results_directory
@@ -106,11 +107,8 @@ def plot(
     else:
         if parameter is not None:
             raise ValueError(f"--parameter is of a sweep, which {directory} is not")
-        results = io.load_results(_results_in(directory))
-        if groundtruth is None:
-            groundtruth = _beside(results.directory, "groundtruth.txt")
-            if groundtruth is not None and objects is None:
-                objects = _beside(groundtruth.parent, "objects.csv", parent=False)
+        results = io.load_results(results_in(directory))
+        groundtruth, objects = truth_of(results.directory, groundtruth, objects)
         shown: dict[int, Path] = {}
         if images is not None:  # before anything is written: can they be told apart?
             times = _frame_times(frame_times, frame_rate)
@@ -131,18 +129,6 @@ def plot(
 
 def _is_sweep(directory: Path) -> bool:
     return (directory / "summary.json").is_file() and not (directory / "trajectory.txt").exists()
-
-
-def _results_in(directory: Path) -> Path:
-    """Return where the results are: of a simulated recording, in its folder of results."""
-    inside = directory / "results"
-    simulated = (directory / "odometry.txt").exists() and (inside / "trajectory.txt").exists()
-    return inside if simulated and not (directory / "trajectory.txt").exists() else directory
-
-
-def _beside(directory: Path, name: str, *, parent: bool = True) -> Path | None:
-    folders = (directory, directory.resolve().parent) if parent else (directory,)
-    return next((one / name for one in folders if (one / name).is_file()), None)
 
 
 def _frame_times(table: Path | None, rate: float | None) -> FrameTimes | None:

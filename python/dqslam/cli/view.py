@@ -7,20 +7,27 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from dqslam.cli.output import Output, Quiet
+from dqslam.cli.found import results_in, truth_of
+from dqslam.cli.output import Json, Output, Quiet
 
 if TYPE_CHECKING:
     from dqslam.view import Scene
 
 
 def view(
-    directory: Annotated[Path, typer.Argument(metavar="DIR", help="What `dqslam run` wrote.")],
+    directory: Annotated[
+        Path,
+        typer.Argument(metavar="DIR", help="What `dqslam run` wrote, or `dqslam simulate` before."),
+    ],
     groundtruth: Annotated[
         Path | None,
-        typer.Option(help="True trajectory, in any world. Default: DIR/groundtruth.txt if any."),
+        typer.Option(
+            help="True trajectory, in any world. Default: groundtruth.txt in DIR or beside it."
+        ),
     ] = None,
     objects: Annotated[
-        Path | None, typer.Option(help="CSV of true objects. Default: DIR/objects.csv if any.")
+        Path | None,
+        typer.Option(help="CSV of true objects. Default: objects.csv beside groundtruth.txt."),
     ] = None,
     align: Annotated[
         Literal["se3", "sim3", "se2", "none"],
@@ -43,6 +50,7 @@ def view(
         int, typer.Option(min=1, max=65535, help="Its port, or the next one that is free.")
     ] = 8080,
     quiet: Quiet = False,
+    json: Json = False,
 ) -> None:
     """Show the map of DIR on a page: trajectory, cameras, objects, boxes, truth; Ctrl-C stops.
 
@@ -51,10 +59,9 @@ def view(
     from dqslam import io
     from dqslam.view import ESTIMATE, build_scene, rgb, write_page, write_rerun
 
-    output = Output(quiet=quiet)
-    results = io.load_results(directory)
-    groundtruth = groundtruth or _beside(directory / "groundtruth.txt")
-    objects = objects or (_beside(directory / "objects.csv") if groundtruth else None)
+    output = Output(quiet=quiet, as_json=json)
+    results = io.load_results(results_in(directory))
+    groundtruth, objects = truth_of(results.directory, groundtruth, objects)
     scene = build_scene(
         results,
         groundtruth=(
@@ -63,21 +70,22 @@ def view(
         objects=None if objects is None else io.read_true_objects(objects),
         align=align,
     )
+    written: dict[str, str] = {}
     if export is not None:
-        output.line(f"wrote {write_page(scene, export)}: open it, or serve the folder")
+        written["page"] = str(write_page(scene, export))
     if rerun is not None:
         with output.waiting("writing"):
             write_rerun(scene, rerun)
-        output.line(f"wrote {rerun}")
+        written["rerun"] = str(rerun)
     if ply is not None:
         io.write_ply(ply, results, [rgb(one.color) for one in scene.objects], rgb(ESTIMATE))
-        output.line(f"wrote {ply}")
-    if export is None and rerun is None and ply is None:
+        written["ply"] = str(ply)
+    for path in written.values():
+        output.line(f"wrote {path}")
+    if written:
+        output.document(written)
+    else:
         _serve(scene, host, port, output)
-
-
-def _beside(path: Path) -> Path | None:
-    return path if path.is_file() else None
 
 
 def _serve(scene: Scene, host: str, port: int, output: Output) -> None:
@@ -88,6 +96,7 @@ def _serve(scene: Scene, host: str, port: int, output: Output) -> None:
 
     try:
         with serve(scene, host=host, port=port) as address:
+            output.document({"address": address})
             output.line(f"{address} shows {scene.title}; Ctrl-C stops")
             while True:
                 sleep(3600.0)

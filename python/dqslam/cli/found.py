@@ -1,0 +1,29 @@
+"""Files that a command finds by itself: results in a simulated recording, the truth beside them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+GROUNDTRUTH, OBJECTS = "groundtruth.txt", "objects.csv"
+
+
+def results_in(directory: Path) -> Path:
+    """Return where the results are: of a simulated recording, in its folder of results."""
+    inside = directory / "results"
+    simulated = (directory / "odometry.txt").exists() and (inside / "trajectory.txt").exists()
+    return inside if simulated and not (directory / "trajectory.txt").exists() else directory
+
+
+def truth_of(
+    results: Path, groundtruth: Path | None, objects: Path | None
+) -> tuple[Path | None, Path | None]:
+    """Return the true trajectory and objects: as given, else in the results or beside them."""
+    if groundtruth is not None:
+        return groundtruth, objects
+    folders = (results, results.resolve().parent)
+    found = next((one for one in folders if (one / GROUNDTRUTH).is_file()), None)
+    if found is None:
+        return None, objects
+    if objects is None and (found / OBJECTS).is_file():
+        objects = found / OBJECTS
+    return found / GROUNDTRUTH, objects
