@@ -1,8 +1,8 @@
 #include "dqslam/block_cholesky.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
-#include <cmath>
+
+#include "dqslam/dense_front.h"
 
 namespace dqslam {
 namespace {
@@ -34,25 +34,10 @@ void AddUpdate(const double* source,
   }
 }
 
-// Kernel.
-bool FactorizeFront(int columns, int rows, double* factor, double* update) {
-  Eigen::Map<MatrixXd> F(factor, rows, columns);
-  Eigen::Ref<MatrixXd> pivots = F.topRows(columns);
-  Eigen::LLT<Eigen::Ref<MatrixXd>> llt(pivots);
-  if (llt.info() != Eigen::Success) return false;
-  if (!F.topRows(columns).diagonal().allFinite()) return false;
-  const int below = rows - columns;
-  if (below == 0) return true;
-  auto L = F.bottomRows(below);
-  F.topRows(columns).triangularView<Eigen::Lower>().transpose().solveInPlace<Eigen::OnTheRight>(L);
-  Eigen::Map<MatrixXd>(update, below, below).selfadjointView<Eigen::Lower>().rankUpdate(L, -1.0);
-  return true;
-}
-
 }  // namespace
 
 BlockCholesky::BlockCholesky(const BlockMatrix& A) : elimination_(A) {
-  factor_.resize(elimination_.fronts.back().factor);
+  factor_.resize(elimination_.fronts.back().factor + kFrontPadding);
   for (int s = 0; s < 2; ++s) stacks_[s].resize(elimination_.stack_size[s]);
 }
 
@@ -61,7 +46,9 @@ void BlockCholesky::Assemble(const BlockMatrix& A, const Front& front, const Fro
   double* factor = factor_.data() + front.factor;
   double* update = stacks_[front.stack].data() + front.update;
   std::fill_n(factor, std::ptrdiff_t{rows} * front.columns, 0.0);
-  std::fill_n(update, std::ptrdiff_t{front.below} * front.below, 0.0);
+  for (int c = 0; c < front.below; ++c) {
+    std::fill_n(update + std::ptrdiff_t{c} * (front.below + 1), front.below - c, 0.0);
+  }
   for (int k = front.block; k < end.block; ++k) {
     const PlacedBlock& placed = elimination_.blocks[k];
     double* to = factor + std::ptrdiff_t{placed.column} * rows + placed.row;
@@ -107,7 +94,7 @@ bool BlockCholesky::Factorize(const BlockMatrix& A, const VectorXd& damping) {
     for (int c = 0; c < front.columns; ++c) {
       factor[std::ptrdiff_t{c} * (rows + 1)] += placed[front.column + c];
     }
-    if (!FactorizeFront(front.columns, rows, factor, stacks_[front.stack].data() + front.update)) {
+    if (!EliminatePivots(front.columns, rows, factor, stacks_[front.stack].data() + front.update)) {
       return false;
     }
   }

@@ -69,7 +69,7 @@ Lists FactorPattern(const BlockMatrix& A, const std::vector<int>& order) {
 // Time of a front, in multiplications with addition: arithmetic, the update's way through memory,
 // and what it takes to begin..
 double Cost(double columns, double below) {
-  constexpr double kPerEntry = 1, kPerFront = 300;
+  constexpr double kPerEntry = 2, kPerFront = 1000;
   const double arithmetic =
       columns * columns * columns / 6 + columns * below * (columns + below) / 2;
   return arithmetic + kPerEntry * below * below / 2 + kPerFront;
