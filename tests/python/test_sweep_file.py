@@ -1,0 +1,190 @@
+"""Files of sweeps into cells."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dqslam import _core, load_scenario
+from dqslam.io.files import FileError
+from dqslam.sweep import load_sweep
+from dqslam.sweep import trial as trial_module
+
+PAPER = load_scenario("paper")
+ROTATION = "scenario.odometry.rotation_sigma_rad"
+EDGE = "scenario.detector.edge_sigma_px"
+
+# A quick drive: half the way, few objects.
+SMALL = """\
+scenario = "paper"
+trials = 3
+seed = 5
+
+[fixed]
+scenario.path.laps = 1
+scenario.world.object_count = 4
+
+[grid]
+scenario.odometry.rotation_sigma_rad = [0.01, 0.02]
+"estimator.loss" = ["none", "cauchy"]
+"""
+
+
+@pytest.fixture
+def write(tmp_path):
+    def write_file(text, name="sweep.toml"):
+        path = tmp_path / name
+        path.write_text(text)
+        return path
+
+    return write_file
+
+
+def test_cells_are_the_grid_with_its_last_setting_fastest(write):
+    sweep = load_sweep(write(SMALL))
+    assert sweep.parameters == (ROTATION, "estimator.loss")
+    assert [tuple(cell.values.values()) for cell in sweep.cells] == [
+        (0.01, "none"),
+        (0.01, "cauchy"),
+        (0.02, "none"),
+        (0.02, "cauchy"),
+    ]
+    assert sweep.seeds == (5, 6, 7)
+    for cell in sweep.cells:
+        scenario = cell.settings.scenario
+        assert (scenario.path.laps, scenario.world.object_count) == (1, 4)
+        assert scenario.odometry.rotation_sigma_rad == cell.values[ROTATION]
+        loss = cell.values["estimator.loss"]
+        assert cell.settings.options().loss == _core.Loss[loss.upper()]
+        assert scenario.camera == PAPER.camera
+
+
+def test_a_file_without_varied_settings_is_one_cell_of_50_seeds(write):
+    sweep = load_sweep(write('scenario = "honest"\n'))
+    assert sweep.parameters == ()
+    assert [cell.settings.scenario.name for cell in sweep.cells] == ["honest"]
+    assert sweep.seeds == tuple(range(50))
+
+
+def test_a_scenario_beside_the_file_is_found(write):
+    write('base = "paper"\nobjects = "ellipsoids"\n', "mine.toml")
+    sweep = load_sweep(write('scenario = "mine.toml"\n'))
+    assert sweep.cells[0].settings.scenario.objects == "ellipsoids"
+
+
+RANDOM = """\
+scenario = "paper"
+samples = {samples}
+
+[grid]
+estimator.loss = ["none", "dcs"]
+
+[random]
+scenario.detector.edge_sigma_px = {{ low = 0.5, high = 8.0, log = true }}
+scenario.odometry.rotation_sigma_rad = {{ low = 0.01, high = 0.03 }}
+scenario.world.object_count = {{ low = 5, high = 8, whole = true }}
+"""
+
+
+def test_random_settings_are_spread_as_told_and_crossed_with_the_grid(write):
+    sweep = load_sweep(write(RANDOM.format(samples=400)))
+    assert len(sweep.cells) == 800
+    edge, rotation, count = (
+        np.array([cell.values[name] for cell in sweep.cells])
+        for name in (EDGE, ROTATION, "scenario.world.object_count")
+    )
+    for values in (edge, rotation, count):  # both losses see the same samples
+        np.testing.assert_array_equal(values[:400], values[400:])
+    assert 0.5 <= edge.min() < 0.52
+    assert 7.6 < edge.max() < 8.0
+    assert np.median(edge) == pytest.approx(2.0, rel=0.15)  # the geometric mean of both ends
+    assert np.mean(rotation) == pytest.approx(0.02, rel=0.05)
+    assert set(count.tolist()) == {5, 6, 7, 8}
+    assert np.abs(np.corrcoef([np.log(edge), rotation, count])[np.triu_indices(3, 1)]).max() < 0.15
+
+
+def test_more_samples_add_to_those_there_were(write):
+    few = load_sweep(write(RANDOM.format(samples=3)))
+    many = load_sweep(write(RANDOM.format(samples=10)))
+    assert [cell.values for cell in few.cells[:3]] == [cell.values for cell in many.cells[:3]]
+    other = load_sweep(write("sample_seed = 1\n" + RANDOM.format(samples=3)))
+    assert other.cells[0].values[EDGE] != few.cells[0].values[EDGE]
+
+
+def test_all_mistakes_are_named_at_once_with_their_lines(write):
+    path = write(
+        """\
+scenario = "paper"
+samples = 2
+[fixed]
+scenario.objects = "spheres"
+scenario.detector.min_side_px = 9.0
+[grid]
+scenario.odometry.rotation_sigma = [0.01, 0.02]
+"estimator.loss" = ["none",
+   "cauchi"]
+estimator.max_iterations = 3
+scenario.detector.min_side_px = [50.0, -1.0, 50.0]
+[random]
+scenario.detector.edge_sigma_px = { low = 0.5, hig = 8.0 }
+scenario.world.object_count = { low = 10, high = 5, whole = true }
+scenario.odometry.translation_sigma_m = 3
+"""
+    )
+    with pytest.raises(FileError) as caught:
+        load_sweep(path)
+    said = str(caught.value).replace(f"{path}:", "").splitlines()
+    for mistake in (
+        "4: scenario.objects: Input should be 'cubes' or 'ellipsoids', not 'spheres'",
+        "7: unknown key scenario.odometry.rotation_sigma; did you mean rotation_sigma_rad?",
+        "10: estimator.max_iterations: expected values, like [1, 2]",
+        "11: scenario.detector.min_side_px: 50.0 stands twice",
+        "11: scenario.detector.min_side_px: Input should be greater than or equal to 0, not -1.0",
+        "13: scenario.detector.edge_sigma_px.high is missing",
+        "13: unknown key scenario.detector.edge_sigma_px.hig; did you mean high?",
+        "14: scenario.world.object_count: low, 10, is not below high, 5",
+        "15: scenario.odometry.translation_sigma_m: expected a range, "
+        "like { low = 1.0, high = 2.0 }",
+        "11: scenario.detector.min_side_px is in another table too",
+    ):
+        assert mistake in said
+    assert any(line.startswith("9: estimator.loss: Input should be 'none', ") for line in said)
+    assert len(said) == len(set(said))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('scenario = "moon"', "1: scenario: moon: no such scenario; by name there are: honest"),
+        ("trials = 3", "scenario is missing"),
+        ('scenario = "paper"\ntrials = 0', "2: trials: Input should be greater than"),
+        ('scenario = "paper"\ntrails = 9', "2: unknown key trails; did you mean trials?"),
+        ('scenario = "paper"\nsamples = 9', "2: samples: no setting is random"),
+        ('scenario = "paper"\ngrid.estimator.method = ["paper"]', "algebraic_sigma is missing"),
+        (
+            'scenario = "paper"\nbound = true\nfixed.estimator.method = "paper"',
+            "method: the paper's has neither",
+        ),
+        ('scenario = "paper"\nrandom.x = { low = 0, high = 1, log = true }', "low is not above 0"),
+        ('scenario = "paper"\nrandom.x = { low = 0.5, high = 1, whole = true }', "whole low and"),
+        ('scenario = "paper"\n[grid', "2: not a TOML file"),
+    ],
+)
+def test_a_wrong_file_is_refused(write, text, message):
+    path = write(text)
+    with pytest.raises(FileError) as caught:
+        load_sweep(path)
+    assert message in str(caught.value)
+    assert str(caught.value).startswith(str(path))
+
+
+PAGE = (Path(__file__).parents[2] / "docs" / "sweeps.md").read_text(encoding="utf-8")
+
+
+def test_the_page_shows_a_file_that_is_right_and_has_all_metrics(write):
+    (text,) = re.findall(r"^```toml\n(.*?)^```$", PAGE, flags=re.MULTILINE | re.DOTALL)
+    sweep = load_sweep(write("samples = 10\n" + text))
+    assert len(sweep.cells) * len(sweep.seeds) == 3000
+    for name in trial_module.METRICS:
+        assert f"`{name}`" in PAGE
