@@ -54,7 +54,11 @@ class Overlay:
             )
         axes.clear()
         axes.set_axis_off()
-        axes.imshow(pixels, cmap="gray", interpolation="nearest", aspect="auto")
+        # Grey as it is, not stretched over what occurs: floats are shares, integers of a byte or two.
+        white = 1.0 if pixels.dtype.kind == "f" else float(np.iinfo(pixels.dtype).max)
+        axes.imshow(
+            pixels, cmap="gray", vmin=0.0, vmax=white, interpolation="nearest", aspect="auto"
+        )
         axes.set(xlim=(-0.5, width - 0.5), ylim=(height - 0.5, -0.5))
         detected = np.zeros(0, dtype=np.int64)
         if self._fits is not None:
