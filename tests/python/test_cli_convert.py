@@ -212,3 +212,9 @@ def test_a_bag_becomes_a_folder(folder, call):
     assert not (folder / "twice").exists()
     assert "1 poses as tum" in call("two twice --topic /b")
     assert "no topic /c that can be read (it has: /a, /b, /boxes)" in call("two third --topic /c")
+
+
+def test_quiet_and_json(folder, call):
+    assert call("camera.json c.toml --quiet") == ""
+    (written,) = json.loads(call("boxes.csv boxes.json --json"))["written"]
+    assert written == {"path": "boxes.json", "what": "2 boxes as coco", "loses": []}

@@ -114,3 +114,17 @@ def test_missing_results_are_named(files, capsys):
 def test_groundtruth_is_needed(files, capsys):
     assert main(["evaluate", str(files.results)]) == 2
     assert "--groundtruth" in capsys.readouterr().err
+
+
+def test_its_options_stand_beside_it_and_give_it_again(files, capsys):
+    assert call(files, "--objects", files.objects, "--align", "sim3", "--quiet") == 0
+    assert capsys.readouterr() == ("", "")
+    path = files.results / "evaluation.json"
+    first = path.read_bytes()
+    path.unlink()
+    options = path.with_suffix(".toml")
+    assert main(["evaluate", "--config", str(options), "--json"]) == 0
+    assert path.read_bytes() == first
+    assert capsys.readouterr().out == first.decode()
+    assert main(["evaluate", "--config", str(options), "--align", "none", "--quiet"]) == 0
+    assert json.loads(path.read_text())["align"] == "none"

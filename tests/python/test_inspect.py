@@ -401,3 +401,10 @@ def test_a_street_in_the_formats_of_kitti_and_mot(tmp_path, capsys):
     content = json.loads(capsys.readouterr().out)
     assert (content["warnings"], content["unchecked"]) == ([], {})
     assert content["overlap"]["boxes_with_pose"] == 1476
+
+
+def test_quiet_says_nothing_but_the_exit_code(files, capsys):
+    camera = json.loads(files[0].read_text())
+    files[0].write_text(json.dumps(camera | {"width": 480, "height": 640}))
+    assert call(files, "--ids", "track_id", "--strict", "--quiet") == 3
+    assert capsys.readouterr() == ("", "")
