@@ -39,7 +39,7 @@ myst_heading_anchors = 3
 nitpicky = True
 nitpick_ignore_regex = [
     ("py:.*", r"(numpy|np|pathlib|collections|typing|pydantic|typer|enum|matplotlib)\..*"),
-    ("py:.*", r"(Any|ArrayLike|NDArray|ndarray|Align|Ids|TypeAliasForwardRef)"),
+    ("py:.*", r"(Any|ArrayLike|NDArray|ndarray|float64|int64|bool|Align|Ids|TypeAliasForwardRef)"),
     ("py:.*", r"dict\[.*|dqslam\.experiment\.methods\.Settings|dqslam\.io\.results\.save\..*"),
     ("py:.*", r"dqslam\.associate\.scene_map\.SceneMap"),  # the inside of an association
 ]
@@ -52,6 +52,7 @@ napoleon_google_docstring = False
 napoleon_use_rtype = False
 python_maximum_signature_line_length = 80
 add_module_names = False
+python_use_unqualified_type_names = True
 
 html_theme = "furo"
 html_title = f"dqslam {release}"

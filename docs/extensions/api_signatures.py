@@ -7,7 +7,11 @@ Napoleon takes an attribute's "Metres: of the centre" for a type and its explana
 
 import re
 
+from docutils import nodes
+from numpy.typing import ArrayLike
+from sphinx import addnodes
 from sphinx.application import Sphinx
+from sphinx.util.typing import stringify_annotation
 
 _SHORTER = [
     (r"typing\.Annotated\[numpy\.typing\.(ArrayLike|NDArray\[numpy\.\w+\])[^\]]*\]\"\]", r"\1"),
@@ -19,8 +23,14 @@ _SHORTER = [
     (r"array\(\[\](, \w+=[^)]*(\(0, \d\)[^)]*)?)?\)", "[]"),
     (r"array\(\[([^\]]*)\]\)", r"[\1]"),
     (r"<dqslam\._core\.(\w+) object at \w+>", r"\1()"),
+    (
+        r"~?(numpy\.)?ndarray\[tuple\[~?(typing\.)?Any, \.\.\.\], "
+        r"~?(numpy\.)?dtype\[~?(numpy\.)?(\w+)\]\]",
+        r"NDArray[\5]",
+    ),
+    (re.escape(stringify_annotation(ArrayLike, "smart")), "ArrayLike"),
+    (r"<factory>", "..."),
     (r"self: dqslam\._core\.\w+(, )?", ""),
-    (r"dqslam\._core\.", ""),
 ]
 
 
@@ -35,9 +45,21 @@ def _shorten(
 ) -> tuple[str | None, str | None] | None:
     if hasattr(obj, "model_fields"):
         return "(**settings)", None  # those of a file, which the page shows
-    if not name.startswith("dqslam._core."):
-        return None
     return _short(signature), _short(returns)
+
+
+def _shorten_types(app: Sphinx, domain: str, kind: str, content: addnodes.desc_content) -> None:
+    """Shorten the types of attributes, which autodoc writes past the event above."""
+    for annotation in content.parent.findall(addnodes.desc_annotation):
+        if "dtype" not in annotation.astext():
+            continue
+        # A reference holds its name twice: in full, and what is shown where it is resolved.
+        for condition in list(annotation.findall(addnodes.pending_xref_condition)):
+            if condition["condition"] == "resolved":
+                condition.parent.remove(condition)
+        text = annotation.astext()
+        annotation.clear()
+        annotation += nodes.Text(_short(text))
 
 
 def _short(text: str | None) -> str | None:
@@ -73,4 +95,5 @@ def setup(app: Sphinx) -> dict[str, bool]:
     app.connect("autodoc-process-docstring", _keep, priority=400)
     app.connect("autodoc-process-docstring", _restore, priority=600)
     app.connect("autodoc-process-signature", _shorten)
+    app.connect("object-description-transform", _shorten_types)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
