@@ -5,6 +5,8 @@ from contextlib import ExitStack
 from itertools import islice
 from typing import Any, TypeVar
 
+from dqslam.pool.processes import interrupts_held
+
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
@@ -33,7 +35,8 @@ def run_in_dask(
     with ExitStack() as stack:
         if scheduler is None:
             here = {"n_workers": jobs, "threads_per_worker": 1, "dashboard_address": None}
-            where: Any = stack.enter_context(LocalCluster(**here))
+            with interrupts_held():  # workers leave Ctrl-C to this process, which ends them
+                where: Any = stack.enter_context(LocalCluster(**here))
         else:
             where = scheduler
         try:

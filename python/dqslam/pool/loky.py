@@ -1,6 +1,5 @@
 """Items in processes of this machine, by joblib's loky."""
 
-import multiprocessing.resource_tracker
 import os
 import warnings
 from collections.abc import Callable, Generator, Iterable
@@ -19,14 +18,12 @@ def run_in_loky(
     from joblib import Parallel, delayed, parallel_config
     from joblib.externals.loky.backend import resource_tracker
 
-    # Both trackers, when they start, let interrupts in again; hence before these are held.
-    multiprocessing.resource_tracker.ensure_running()
-    resource_tracker.ensure_running()
+    resource_tracker.ensure_running()  # as in `interrupts_held`; loky has its own
     with parallel_config(
         "loky", inner_max_num_threads=1, initializer=end_with_parent, initargs=(os.getpid(),)
     ):
         parallel = Parallel(n_jobs=jobs, return_as="generator_unordered", batch_size=1)
-        with interrupts_held():  # processes inherit it; interrupted at their start, they say much
+        with interrupts_held():  # until processes have started
             results = parallel(delayed(function)(item) for item in items)
     try:
         # "yield from" would hand a stop on to joblib, past what is below.

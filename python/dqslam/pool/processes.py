@@ -1,6 +1,6 @@
 """Items in processes of this machine, with nothing but the standard library."""
 
-import multiprocessing
+import multiprocessing.resource_tracker
 import os
 import signal
 import time
@@ -29,7 +29,7 @@ def run_in_processes(
         initargs=(os.getpid(),),
     )
     try:
-        # Processes inherit both. Were they interrupted while they start, they would say much.
+        # Interrupted while they start, before `end_with_parent`, processes would say much.
         with interrupts_held(), _environment(ONE_THREAD):
             futures = [executor.submit(function, item) for item in items]
         for future in as_completed(futures):
@@ -40,7 +40,8 @@ def run_in_processes(
 
 @contextmanager
 def interrupts_held() -> Iterator[None]:
-    """Put off Ctrl-C in this thread."""
+    """Put off Ctrl-C in this thread, and keep it from the processes that it starts."""
+    multiprocessing.resource_tracker.ensure_running()  # when it starts, it lets Ctrl-C in again
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
