@@ -128,7 +128,7 @@ def test_the_command_serves_until_ctrl_c(tmp_path):
     try:
         line = served.stdout.readline()
         address = line.split()[0]
-        assert line == f"{address} shows out; Ctrl-C stops\n"
+        assert line == f"{address} shows {tmp_path.name}/out; Ctrl-C stops\n"
         with urllib.request.urlopen(address, timeout=30) as answer:
             assert answer.status == 200
             assert b"<title>" in answer.read()

@@ -79,6 +79,15 @@ def test_a_class_has_a_colour(files):
     assert rgb("#d55e00") == (213, 94, 0)
 
 
+def test_objects_of_one_class_differ_by_themselves(files):
+    path = files.results / "map.json"
+    content = json.loads(path.read_text())
+    for one in content["objects"]:
+        one["class_name"] = "cup"
+    path.write_text(json.dumps(content))
+    assert len({one.color for one in look(files).objects}) == 5
+
+
 def test_the_spread_is_an_ellipsoid_of_the_covariance(files):
     turn = planted.TURNS[3].as_matrix()
     covariance = turn @ np.diag([0.04, 0.09, 0.01]) @ turn.T

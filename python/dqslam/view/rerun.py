@@ -28,7 +28,7 @@ def write_rerun(scene: Scene, path: str | Path) -> None:
     except ModuleNotFoundError:
         raise RuntimeError("--rerun needs rerun-sdk: pip install 'dqslam[rerun]'") from None
     with whole_file(path) as temporary:
-        stream = rerun.RecordingStream("dqslam", recording_id=scene.title)
+        stream = rerun.RecordingStream("dqslam")
         stream.save(temporary)
         stream.send_recording_name(scene.title)
         _log_world(stream, scene)

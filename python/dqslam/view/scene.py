@@ -36,7 +36,7 @@ class SceneObject:
     """-1 for a true object without one."""
     class_name: str
     color: str
-    """``#rrggbb``, one a class."""
+    """``#rrggbb``, one a class; one an object where there is one class only."""
     center: Floats
     """Metres, shape (3,)."""
     semi_axes: Floats | None
@@ -156,7 +156,7 @@ def build_scene(
         if objects is not None:
             true_objects = _true_objects(objects, estimated_from_true, colors)
     return Scene(
-        title=results.directory.resolve().name,
+        title="/".join(results.directory.resolve().parts[-2:]),
         up=up_direction(results.world_from_camera),
         camera=results.camera,
         timestamps=results.timestamps,
@@ -196,11 +196,14 @@ def _mapped_objects(
 ) -> tuple[SceneObject, ...]:
     mapped = results.objects
     numbers = object_numbers(results, evaluation)
+    of_object = [colors[name] for name in mapped.class_name]
+    if len(set(mapped.class_name)) == 1:
+        of_object = [CLASSES[row % len(CLASSES)] for row in range(len(mapped))]
     return tuple(
         SceneObject(
             id=int(mapped.id[row]),
             class_name=mapped.class_name[row],
-            color=colors[mapped.class_name[row]],
+            color=of_object[row],
             center=mapped.center[row],
             semi_axes=_known(mapped.semi_axes[row]),
             orientation_xyzw=_known(mapped.orientation_xyzw[row]),
