@@ -1,0 +1,154 @@
+import json
+from importlib import import_module
+
+import pytest
+
+pytest.importorskip("matplotlib")
+from PIL import Image
+
+import planted
+from dqslam.cli import main
+from dqslam.io import load_results
+
+FIGURES = ["boxes", "map", "position_error", "residuals", "rotation_error"]
+SIZE = (planted.CAMERA.width, planted.CAMERA.height)
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    return planted.write_planted(tmp_path_factory.mktemp("planted"))
+
+
+@pytest.fixture(scope="module")
+def images(tmp_path_factory):
+    """Return a folder of an image for each pose, in their order."""
+    folder = tmp_path_factory.mktemp("images")
+    for pose in range(planted.POSES):
+        Image.new("RGB", SIZE, (90, 90, 90)).save(folder / f"left_{pose:03}.jpg")
+    return folder
+
+
+def run(capsys, *arguments):
+    code = main(["plot", *map(str, arguments)])
+    return code, capsys.readouterr()
+
+
+def names(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+def test_with_the_truth(tmp_path, capsys, files):
+    code, said = run(
+        capsys, files.results, "--out", tmp_path / "new", "--format", "png",
+        "--groundtruth", files.groundtruth, "--objects", files.objects,
+    )  # fmt: skip
+    assert (code, said.err) == (0, "")
+    assert names(tmp_path / "new") == [f"{name}.png" for name in FIGURES]
+    assert said.out.splitlines() == [f"wrote {tmp_path / 'new' / name}.png" for name in FIGURES]
+
+
+def test_without_it_json_says_what_is_left_out(tmp_path, capsys, files):
+    code, said = run(capsys, files.results, "--out", tmp_path, "--json")
+    assert code == 0
+    found = json.loads(said.out)
+    assert found["figures"] == [str(tmp_path / f"{n}.svg") for n in ("boxes", "map", "residuals")]
+    assert set(found["left_out"]) == {"position_error", "rotation_error"}
+
+
+def test_a_simulated_recording_has_its_truth_beside(tmp_path, capsys):
+    assert main(["simulate", "orbit", "--out", str(tmp_path / "sim"), "--quiet"]) == 0
+    assert main(["run", "--config", str(tmp_path / "sim" / "run.toml"), "--quiet"]) == 0
+    for given in (tmp_path / "sim", tmp_path / "sim" / "results"):
+        code, said = run(capsys, given, "--out", tmp_path / "of" / given.name, "--quiet")
+        assert (code, said.out) == (0, "")
+        assert names(tmp_path / "of" / given.name) == [f"{name}.svg" for name in FIGURES]
+
+
+def test_stills_of_some_frames(tmp_path, capsys, files, images):
+    code, _ = run(
+        capsys, files.results, "--out", tmp_path, "--images", images, "--frames", "3,10-14:2"
+    )
+    assert code == 0
+    assert names(tmp_path / "images") == [f"left_{pose:03}.png" for pose in (3, 10, 12, 14)]
+    with Image.open(tmp_path / "images" / "left_003.png") as still:
+        assert still.size == SIZE
+    code, _ = run(capsys, files.results, "--out", tmp_path / "few", "--images", images)
+    assert (code, len(names(tmp_path / "few" / "images"))) == (0, 9)
+
+
+def test_a_film(tmp_path, capsys, files, images):
+    film = tmp_path / "film.gif"
+    code, said = run(
+        capsys, files.results, "--out", tmp_path, "--images", images, "--frames", "0-4",
+        "--video", film, "--video-rate", 4,
+    )  # fmt: skip
+    assert code == 0
+    assert f"wrote {film}" in said.out
+    with Image.open(film) as found:
+        assert (found.n_frames, found.info["duration"]) == (5, 250)
+
+
+def test_times_of_frames_from_a_file(tmp_path, capsys, files, images):
+    """Frame 5 was taken at the third pose, whatever the order of the images."""
+    third = load_results(files.results).timestamps[2]
+    (tmp_path / "frames.csv").write_text(f"frame,timestamp\n5,{third}\n6,{third + 1e5}\n")
+    code, said = run(
+        capsys, files.results, "--out", tmp_path, "--images", images,
+        "--frame-times", tmp_path / "frames.csv", "--frames", "2",
+    )  # fmt: skip
+    assert (code, said.err) == (0, "")
+    assert names(tmp_path / "images") == ["left_005.png"]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--frames", "3"], "--frames and --video are of --images"),
+        (["--images", "IMAGES", "--frames", "7-3"], "--frames: '7-3' is not like 7, 7-20 or"),
+        (["--images", "IMAGES", "--frames", "x"], "--frames: 'x' is not like"),
+        (["--images", "IMAGES", "--frames", "999"], "no image is of a pose among 999"),
+        (["--images", "IMAGES", "--video", "film.avi"], "film.avi: its name ends in none of"),
+        (["--images", "none"], "none: no such folder of images"),
+        (["--groundtruth", "none.txt"], "none.txt: no such file"),
+        (
+            ["--images", "IMAGES", "--frame-rate", "1", "--frame-times", "x.csv"],
+            "--frame-times and --frame-rate both say",
+        ),
+        (["--parameter", "seed"], "--parameter is of a sweep"),
+    ],
+)
+def test_a_mistake_is_one_line_and_nothing_is_written(
+    tmp_path, capsys, files, images, options, message
+):
+    options = [str(images) if one == "IMAGES" else one for one in options]
+    code, said = run(capsys, files.results, "--out", tmp_path / "out", *options)
+    assert code == 2
+    assert message in said.err
+    assert said.err.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_directory_that_is_not_there(tmp_path, capsys):
+    code, said = run(capsys, tmp_path / "none")
+    assert (code, said.err) == (2, f"dqslam: {tmp_path / 'none'}: no such directory\n")
+
+
+def test_a_sweep(tmp_path, capsys):
+    spread = {"median": 1.0, "median_interval": [0.5, 1.5]}
+    summary = {
+        "parameters": ["noise"],
+        "units": {"rmse_pos": "m"},
+        "confidence": 0.95,
+        "trials": 8,
+        "cells": [{"values": {"noise": 1.0}, "metrics": {"rmse_pos": spread}}],
+    }
+    (tmp_path / "summary.json").write_text(json.dumps(summary))
+    code, said = run(capsys, tmp_path, "--format", "pdf", "--parameter", "noise")
+    assert (code, said.out) == (0, f"wrote {tmp_path / 'figures' / 'sweep.pdf'}\n")
+    assert (tmp_path / "figures" / "sweep.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_without_matplotlib_the_error_says_how_to_get_it(capsys, files, monkeypatch):
+    monkeypatch.setattr(import_module("dqslam.cli.plot"), "find_spec", lambda name: None)
+    code, said = run(capsys, files.results)
+    assert (code, said.err) == (2, "dqslam: figures need matplotlib: pip install 'dqslam[plot]'\n")
