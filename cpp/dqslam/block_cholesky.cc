@@ -10,120 +10,114 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// target += the lower triangle of a child's update; `ld` is the number of rows of the front, whose
-// columns from `columns` on are in `update` instead of `factor`.
-void AddUpdate(const double* source,
-               int size,
-               const Run* begin,
-               const Run* end,
-               int columns,
-               int below,
-               double* factor,
-               double* update) {
-  for (const Run* run = begin; run != end; ++run) {
-    for (int c = 0; c < run->length; ++c) {
-      const int column = run->to + c;
-      const double* from = source + std::ptrdiff_t{run->from + c} * size;
-      double* to = column < columns ? factor + std::ptrdiff_t{column} * (columns + below)
-                                    : update + std::ptrdiff_t{column - columns} * below - columns;
-      for (int r = c; r < run->length; ++r) to[run->to + r] += from[run->from + r];
-      for (const Run* rest = run + 1; rest != end; ++rest) {
-        for (int r = 0; r < rest->length; ++r) to[rest->to + r] += from[rest->from + r];
-      }
-    }
-  }
+// A front without its update: L of its pivots and of the rows below them.
+auto PivotsOf(const double* factor, const Front& front) {
+  return Eigen::Map<const MatrixXd, 0, Eigen::OuterStride<>>(
+      factor, front.pivots, front.pivots, Eigen::OuterStride<>(front.rows()));
+}
+auto BelowOf(const double* factor, const Front& front) {
+  return Eigen::Map<const MatrixXd, 0, Eigen::OuterStride<>>(
+      factor + front.pivots, front.below, front.pivots, Eigen::OuterStride<>(front.rows()));
 }
 
 }  // namespace
 
-BlockCholesky::BlockCholesky(const BlockMatrix& A) : elimination_(A) {
-  factor_.resize(elimination_.fronts.back().factor + kFrontPadding);
+BlockCholesky::BlockCholesky(const BlockMatrix& A)
+    : elimination_(A), factor_(elimination_.fronts.back().factor + kFrontPadding) {
   for (int s = 0; s < 2; ++s) stacks_[s].resize(elimination_.stack_size[s]);
 }
 
-void BlockCholesky::Assemble(const BlockMatrix& A, const Front& front, const Front& end) {
-  const int rows = front.columns + front.below;
-  double* factor = factor_.data() + front.factor;
-  double* update = stacks_[front.stack].data() + front.update;
-  std::fill_n(factor, std::ptrdiff_t{rows} * front.columns, 0.0);
-  for (int c = 0; c < front.below; ++c) {
-    std::fill_n(update + std::ptrdiff_t{c} * (front.below + 1), front.below - c, 0.0);
+bool BlockCholesky::Factorize(const BlockMatrix& A, const VectorXd& damping) {
+  VectorXd placed_damping(damping.size());
+  for (Eigen::Index r = 0; r < damping.size(); ++r) {
+    placed_damping[elimination_.place[r]] = damping[r];
   }
-  for (int k = front.block; k < end.block; ++k) {
+  for (int f = 0; f < elimination_.num_fronts(); ++f) {
+    const Front& front = elimination_.fronts[f];
+    PlaceBlocks(A, f);
+    for (int c = 0; c < front.pivots; ++c) {
+      Factor(f)[std::ptrdiff_t{c} * (front.rows() + 1)] += placed_damping[front.pivot + c];
+    }
+    AddUpdates(f);
+    if (!EliminatePivots(front.pivots, front.rows(), Factor(f), Update(f))) return false;
+  }
+  return true;
+}
+
+// Starts the columns of a front with those of A.
+void BlockCholesky::PlaceBlocks(const BlockMatrix& A, int f) {
+  const Front& front = elimination_.fronts[f];
+  const std::ptrdiff_t stride = front.rows();
+  std::fill_n(Factor(f), stride * front.pivots, 0.0);
+  for (int k = front.block; k < elimination_.fronts[f + 1].block; ++k) {
     const PlacedBlock& placed = elimination_.blocks[k];
-    double* to = factor + std::ptrdiff_t{placed.column} * rows + placed.row;
+    double* to = Factor(f) + placed.column * stride + placed.row;
     if (placed.index < 0) {
-      const int size = A.size(-1 - placed.index);
-      const double* from = A.Diagonal(-1 - placed.index);
+      const int block = -1 - placed.index, size = A.size(block);
+      const double* from = A.Diagonal(block);
       for (int c = 0; c < size; ++c) {
-        for (int r = c; r < size; ++r) to[c * rows + r] = from[c * size + r];
+        for (int r = c; r < size; ++r) to[c * stride + r] = from[c * size + r];
       }
-    } else {
-      const auto [i, j] = A.coupled(placed.index);
-      const int rows_from = A.size(i), columns_from = A.size(j);
-      const double* from = A.OffDiagonal(placed.index);
-      for (int c = 0; c < columns_from; ++c) {
-        for (int r = 0; r < rows_from; ++r) {
-          (placed.transposed ? to[r * rows + c] : to[c * rows + r]) = from[c * rows_from + r];
+      continue;
+    }
+    const auto [i, j] = A.coupled(placed.index);
+    const double* from = A.OffDiagonal(placed.index);
+    const int rows = A.size(i), columns = A.size(j);
+    const std::ptrdiff_t down = placed.transposed ? stride : 1;
+    const std::ptrdiff_t right = placed.transposed ? 1 : stride;
+    for (int c = 0; c < columns; ++c) {
+      for (int r = 0; r < rows; ++r) to[c * right + r * down] = from[c * rows + r];
+    }
+  }
+}
+
+// Starts the update of a front with zeros, and adds those of its children to it and the columns.
+void BlockCholesky::AddUpdates(int f) {
+  const Front& front = elimination_.fronts[f];
+  for (int c = 0; c < front.below; ++c) {
+    std::fill_n(Update(f) + std::ptrdiff_t{c} * (front.below + 1), front.below - c, 0.0);
+  }
+  for (int k = front.child; k < elimination_.fronts[f + 1].child; ++k) {
+    const Child& child = elimination_.children[k];
+    const Run* const end = elimination_.runs.data() + elimination_.children[k + 1].run;
+    const std::ptrdiff_t size = elimination_.fronts[child.front].below;
+    for (const Run* run = elimination_.runs.data() + child.run; run != end; ++run) {
+      for (int c = 0; c < run->length; ++c) {
+        const double* from = Update(child.front) + (run->from + c) * size;
+        const int column = run->to + c;
+        double* to =
+            column < front.pivots
+                ? Factor(f) + std::ptrdiff_t{column} * front.rows()
+                : Update(f) + std::ptrdiff_t{column - front.pivots} * front.below - front.pivots;
+        for (int r = c; r < run->length; ++r) to[run->to + r] += from[run->from + r];
+        for (const Run* next = run + 1; next != end; ++next) {
+          for (int r = 0; r < next->length; ++r) to[next->to + r] += from[next->from + r];
         }
       }
     }
   }
-  for (int k = front.child; k < end.child; ++k) {
-    const Child& child = elimination_.children[k];
-    const Front& from = elimination_.fronts[child.front];
-    AddUpdate(stacks_[from.stack].data() + from.update,
-              from.below,
-              elimination_.runs.data() + child.run,
-              elimination_.runs.data() + elimination_.children[k + 1].run,
-              front.columns,
-              front.below,
-              factor,
-              update);
-  }
-}
-
-bool BlockCholesky::Factorize(const BlockMatrix& A, const VectorXd& damping) {
-  VectorXd placed(damping.size());
-  for (Eigen::Index r = 0; r < damping.size(); ++r) placed[elimination_.place[r]] = damping[r];
-  for (size_t f = 0; f + 1 < elimination_.fronts.size(); ++f) {
-    const Front& front = elimination_.fronts[f];
-    Assemble(A, front, elimination_.fronts[f + 1]);
-    double* factor = factor_.data() + front.factor;
-    const int rows = front.columns + front.below;
-    for (int c = 0; c < front.columns; ++c) {
-      factor[std::ptrdiff_t{c} * (rows + 1)] += placed[front.column + c];
-    }
-    if (!EliminatePivots(front.columns, rows, factor, stacks_[front.stack].data() + front.update)) {
-      return false;
-    }
-  }
-  return true;
 }
 
 VectorXd BlockCholesky::Solve(const VectorXd& b) const {
   const Elimination& e = elimination_;
   VectorXd x(b.size()), below;
   for (Eigen::Index r = 0; r < b.size(); ++r) x[e.place[r]] = b[r];
-  const int fronts = static_cast<int>(e.fronts.size()) - 1;
-  for (int f = 0; f < fronts; ++f) {
+  for (int f = 0; f < e.num_fronts(); ++f) {  // L y = b
     const Front& front = e.fronts[f];
-    const Eigen::Map<const MatrixXd> L(
-        factor_.data() + front.factor, front.columns + front.below, front.columns);
-    auto pivots = x.segment(front.column, front.columns);
-    L.topRows(front.columns).triangularView<Eigen::Lower>().solveInPlace(pivots);
-    below.noalias() = L.bottomRows(front.below) * pivots;
+    const double* factor = factor_.data() + front.factor;
+    auto y = x.segment(front.pivot, front.pivots);
+    PivotsOf(factor, front).triangularView<Eigen::Lower>().solveInPlace(y);
+    below.noalias() = BelowOf(factor, front) * y;
     for (int r = 0; r < front.below; ++r) x[e.rows[front.row + r]] -= below[r];
   }
-  for (int f = fronts - 1; f >= 0; --f) {
+  for (int f = e.num_fronts() - 1; f >= 0; --f) {  // L^T x = y
     const Front& front = e.fronts[f];
-    const Eigen::Map<const MatrixXd> L(
-        factor_.data() + front.factor, front.columns + front.below, front.columns);
-    auto pivots = x.segment(front.column, front.columns);
+    const double* factor = factor_.data() + front.factor;
+    auto y = x.segment(front.pivot, front.pivots);
     below.resize(front.below);
     for (int r = 0; r < front.below; ++r) below[r] = x[e.rows[front.row + r]];
-    pivots.noalias() -= L.bottomRows(front.below).transpose() * below;
-    L.topRows(front.columns).triangularView<Eigen::Lower>().transpose().solveInPlace(pivots);
+    y.noalias() -= BelowOf(factor, front).transpose() * below;
+    PivotsOf(factor, front).transpose().triangularView<Eigen::Upper>().solveInPlace(y);
   }
   VectorXd solution(b.size());
   for (Eigen::Index r = 0; r < b.size(); ++r) solution[r] = x[e.place[r]];

@@ -9,8 +9,8 @@
 
 namespace dqslam {
 
-/// A + diag(damping) = L L^T, as often as the values of A change. One thread; the same bits each
-/// time.
+/// A + diag(damping) = L L^T, multifrontal, as often as the values of A change. One thread; the
+/// same bits each time.
 class BlockCholesky {
  public:
   /// Orders the blocks and lays out the factor, from the pattern of A alone.
@@ -24,11 +24,18 @@ class BlockCholesky {
   Eigen::VectorXd Solve(const Eigen::VectorXd& b) const;
 
  private:
-  void Assemble(const BlockMatrix& A, const Front& front, const Front& end);
+  void PlaceBlocks(const BlockMatrix& A, int f);
+  void AddUpdates(int f);
+
+  double* Factor(int f) { return factor_.data() + elimination_.fronts[f].factor; }
+  double* Update(int f) {
+    const Front& front = elimination_.fronts[f];
+    return stacks_[front.stack].data() + front.update;
+  }
 
   Elimination elimination_;
-  std::vector<double> factor_;
-  std::vector<double> stacks_[2];
+  std::vector<double> factor_;     // of each front rows() x pivots; garbage above the diagonal
+  std::vector<double> stacks_[2];  // updates
 };
 
 }  // namespace dqslam
