@@ -86,7 +86,7 @@ def plot(
 ) -> None:
     """Draw the results in DIR: the map from above, errors over time, residuals, boxes.
 
-    Needs `pip install 'dqslam[plot]'`. docs/figures.md says what each figure shows. Of a sweep, its
+    Needs `pip install 'dqslam[plot]'`. docs/plots.md says what each figure shows. Of a sweep, its
     metrics against what was varied.
     """
     from dqslam import io

@@ -39,7 +39,7 @@ def plot_results(
     """Draw all that the results allow into files of a kind, "svg", "png" or "pdf".
 
     ``map``, ``boxes``, ``residuals``, and with a true trajectory ``position_error`` and
-    ``rotation_error``: docs/figures.md says what each shows. Nothing is written unless
+    ``rotation_error``: docs/plots.md says what each shows. Nothing is written unless
     all can be drawn.
 
     Parameters

@@ -1,0 +1,75 @@
+"""Draws plot_*: what ``dqslam plot`` makes of two simulated recordings, one of them with images.
+
+Run by hand after a change: ``./run python docs/figures/plots.py``.
+"""
+
+import shutil
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from PIL import Image, ImageDraw
+
+from dqslam import _core, io, load_scenario, simulate
+from dqslam.cli import main
+from dqslam.evaluate import project_outlines
+
+HERE = Path(__file__).parent
+POSE = 45  # of the picture with outlines
+COLORS = ((196, 164, 132), (120, 138, 160), (150, 170, 120), (170, 120, 130))
+
+
+def estimate(name, seed, folder):
+    """Simulate a recording, and run it."""
+    main(["simulate", name, "--seed", str(seed), "--out", str(folder), "--quiet"])
+    main(["run", "--config", str(folder / "run.toml"), "--quiet"])
+
+
+def paint(truth, camera, pose, path):
+    """Paint the true objects as the camera of a pose sees them, far ones first."""
+    image = Image.new("RGB", (camera.width, camera.height), (72, 76, 80))
+    draw = ImageDraw.Draw(image)
+    draw.rectangle([0, 150, camera.width, camera.height], fill=(104, 98, 92))
+    seen_from = _core.world_from_camera(truth.pose_model, camera, truth.poses[[pose]])
+    here = np.repeat(seen_from, len(truth.ellipsoids), axis=0)
+    outlines = project_outlines(camera, here, truth.ellipsoids)
+    distance = np.linalg.norm(truth.center - here[:, :3], axis=1)
+    for row in np.argsort(-distance):
+        if np.isnan(outlines[row]).any():
+            continue
+        color = np.array(COLORS[row % len(COLORS)])
+        middle = outlines[row].mean(axis=0)
+        for share in np.linspace(1.0, 0.1, 30):  # lighter towards the upper left
+            lit = (
+                middle
+                + share * (outlines[row] - middle)
+                - 0.25 * (1.0 - share) * np.ptp(outlines[row], axis=0)
+            )
+            shade = tuple((color * (0.55 + 0.6 * (1.0 - share))).clip(max=255).astype(int))
+            draw.polygon([tuple(point) for point in lit], fill=shade)
+    image.save(path)
+
+
+def draw(folder):
+    """Draw all figures into a folder, and copy those that the page shows."""
+    estimate("paper", 7, folder / "paper")
+    main(["plot", str(folder / "paper"), "--quiet"])
+    estimate("orbit", 1, folder / "orbit")
+    recording, truth = simulate(load_scenario("orbit"), seed=1)
+    results = io.load_results(folder / "orbit" / "results")
+    images = folder / "images"
+    images.mkdir()
+    paint(truth, recording.camera, POSE, images / f"{results.timestamps[POSE]:.6f}.png")
+    main(["plot", str(folder / "orbit"), "--images", str(images), "--quiet"])
+    for source, name in (("paper", "map"), ("paper", "position_error"), ("orbit", "boxes")):
+        shutil.copy(folder / source / "figures" / f"{name}.svg", HERE / f"plot_{name}.svg")
+    shutil.copy(folder / "paper" / "figures" / "residuals.svg", HERE / "plot_residuals.svg")
+    (still,) = (folder / "orbit" / "figures" / "images").iterdir()
+    Image.open(still).convert("RGB").quantize(128, dither=Image.Dither.NONE).save(
+        HERE / "plot_images.png", optimize=True
+    )
+
+
+if __name__ == "__main__":
+    with tempfile.TemporaryDirectory() as temporary:
+        draw(Path(temporary))
