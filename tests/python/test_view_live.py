@@ -1,6 +1,5 @@
 """The live page in a real browser, and the command that serves it."""
 
-import json
 import signal
 import subprocess
 import sys
@@ -25,12 +24,10 @@ PORT = 18080
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory):
     files = planted.write_planted(tmp_path_factory.mktemp("results"), drift=0.3)
-    path = files.results / "map.json"
-    content = json.loads(path.read_text())
-    content["objects"][0]["center_covariance"] = np.diag([1e-4, 4e-4, 9e-4]).tolist()
-    path.write_text(json.dumps(content))
+    results = load_results(files.results)
+    results.objects.center_covariance[:2] = np.diag([1e-4, 4e-4, 9e-4])
     return build_scene(
-        load_results(files.results),
+        results,
         groundtruth=read_trajectory(files.groundtruth),
         objects=read_true_objects(files.objects),
     )

@@ -38,8 +38,11 @@ def web_server(folder):
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory):
     files = planted.write_planted(tmp_path_factory.mktemp("results"), drift=0.3)
+    results = load_results(files.results)
+    results.objects.center_covariance[:2] = np.diag([1e-4, 4e-4, 9e-4])
+    results.covariance[5:8] = 1e-4 * np.eye(6)
     return build_scene(
-        load_results(files.results),
+        results,
         groundtruth=read_trajectory(files.groundtruth),
         objects=read_true_objects(files.objects),
     )
@@ -94,7 +97,7 @@ def test_all_of_the_map_is_on_the_screen(page, scene):
     assert (shown["estimate"], shown["odometry"], shown["truth"]) == (19, 19, 19)  # segments
     assert shown["cameras"] == 20
     assert page.locator("#objects button").count() == 5
-    assert page.locator("#switches label").count() == 7  # there is no covariance in these results
+    assert page.locator("#switches label").count() == 8
     assert page.locator("#overview dt").all_inner_texts() == [name for name, _ in scene.overview]
     for one in scene.objects:
         assert pixels(page, one.color) > 20
@@ -114,6 +117,25 @@ def test_switches(page, name, color, counted):
     page.check(f"#show-{name}")
     # Not to the pixel: a canvas that is read back is drawn by other means.
     assert pixels(page, color) == pytest.approx(before, rel=0.2)
+
+
+def test_covariances_are_shown_if_asked_for(page):
+    assert on_screen(page)["covariances"] == 0
+    page.check("#show-covariance")
+    assert on_screen(page)["covariances"] == 5  # of two objects and three poses
+    page.uncheck("#show-covariance")
+
+
+def test_the_eye_follows_the_camera(page):
+    page.locator("#time").focus()
+    page.keyboard.press("Home")
+    before = on_screen(page)["places"]
+    page.check("#show-follow")
+    moved = on_screen(page)["places"]
+    assert max(abs(a["u"] - b["u"]) for a, b in zip(before, moved, strict=True)) > 5.0
+    page.uncheck("#show-follow")
+    page.reload()
+    page.wait_for_function("window.onScreen")
 
 
 def test_names_and_objects_can_be_hidden(page):

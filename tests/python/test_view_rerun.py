@@ -42,6 +42,7 @@ def test_what_is_logged(files, tmp_path):
     assert objects["Ellipsoids3D:labels"] == [["cup 10", "book 11", "lamp 12", "box 14", "cup 99"]]
     (strips,) = columns["/world/estimate"]["LineStrips3D:strips"]
     np.testing.assert_allclose(strips[0], results.world_from_camera[:, :3], atol=1e-6)
+    assert len(columns["/world/true_objects"]["Ellipsoids3D:centers"][0]) == 6
     assert {"/world/odometry", "/world/truth", "/world/true_objects"} <= set(columns)
     camera = columns["/world/camera"]
     places = [row[0] for row in camera["Transform3D:translation"] if row]

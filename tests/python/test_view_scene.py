@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import planted
 from dqslam import _core
@@ -88,17 +89,34 @@ def test_objects_of_one_class_differ_by_themselves(files):
     assert len({one.color for one in look(files).objects}) == 5
 
 
+def shape_of(one):
+    """Return R diag(a^2) R^T of an ellipsoid, by way of its dual quadric."""
+    ellipsoid = _core.ellipsoid_from_axes(one.center, one.semi_axes, one.orientation_xyzw)
+    quadric = _core.dual_quadric_matrix(_core.dual_quadric_from_ellipsoid(ellipsoid))
+    return np.outer(one.center, one.center) - quadric[:3, :3]
+
+
 def test_the_spread_is_an_ellipsoid_of_the_covariance(files):
     turn = planted.TURNS[3].as_matrix()
     covariance = turn @ np.diag([0.04, 0.09, 0.01]) @ turn.T
-    one = replace(look(files).objects[0], center_covariance=covariance).spread
-    # A point at 3 sigma has the Mahalanobis distance 3.
-    center, axes, xyzw = one.center, one.semi_axes, one.orientation_xyzw
-    quadric = _core.dual_quadric_matrix(
-        _core.dual_quadric_from_ellipsoid(_core.ellipsoid_from_axes(center, axes, xyzw))
+    one = replace(look(files).objects[0], center_covariance=covariance)
+    # A point of it is 3 sigma from the centre.
+    np.testing.assert_allclose(shape_of(one.spread), 9.0 * covariance, atol=1e-12)
+
+
+def test_spreads_of_poses_are_turned_into_the_world(files):
+    """The file has them in the frames of the cameras; the first is exact, and not all are known."""
+    results = load_results(files.results)
+    results.covariance[:] = np.nan
+    results.covariance[0] = 0.0
+    results.covariance[5] = np.diag([0.01, 0.04, 0.09, 1.0, 1.0, 1.0])
+    (spread,) = build_scene(results).pose_spreads
+    turn = Rotation.from_quat(results.world_from_camera[5, 3:]).as_matrix()
+    np.testing.assert_allclose(spread.center, results.world_from_camera[5, :3])
+    expected = 9.0 * sum(
+        v * np.outer(a, a) for v, a in zip([0.01, 0.04, 0.09], turn.T, strict=True)
     )
-    shape = np.outer(center, center) - quadric[:3, :3]
-    np.testing.assert_allclose(shape, 9.0 * covariance, atol=1e-12)
+    np.testing.assert_allclose(shape_of(spread), expected, atol=1e-12)
 
 
 def test_outlines_fill_the_boxes_of_what_is_mapped_as_it_is(files):

@@ -12,13 +12,12 @@ import numpy as np
 
 from dqslam._checks import Floats
 from dqslam.view.picture import draw_image
-from dqslam.view.scene import ESTIMATE, ODOMETRY, TRUTH, Scene, SceneObject, rgb
+from dqslam.view.scene import ESTIMATE, ODOMETRY, TRUTH, Scene, SceneObject, Spread, rgb
 
 if TYPE_CHECKING:
     from viser import ViserServer
 
 FIELD_OF_VIEW = np.radians(60.0)  # of the eye, vertical
-_CAMERAS = 60  # drawn at most
 _NOTHING = "nothing"
 _HERE = ("127.0.0.1", "0.0.0.0", "::1", "::")
 
@@ -68,8 +67,9 @@ class _Page:
         parents["cameras"] = self._cameras()
         parents["objects"] = self._objects()
         parents["names"] = self._names()
-        if any(one.center_covariance is not None for one in scene.objects):
-            parents["covariance"] = self._covariances()
+        spreads = [one.spread for one in scene.objects if one.spread is not None]
+        if spreads or scene.pose_spreads:
+            parents["covariance"] = self._covariances((*spreads, *scene.pose_spreads))
         self._controls(parents)
         self._show()
 
@@ -97,8 +97,7 @@ class _Page:
             "aspect": camera.width * camera.fy / (camera.height * camera.fx),
             "thickness_units": "screen",
         }
-        step = -(-len(self.scene.estimate) // _CAMERAS)
-        for row in range(0, len(self.scene.estimate), step):
+        for row in self.scene.cameras:
             self.server.scene.add_camera_frustum(
                 f"/cameras/{row}",
                 **shape,
@@ -138,12 +137,11 @@ class _Page:
             )
         return group
 
-    def _covariances(self) -> Any:
+    def _covariances(self, spreads: tuple[Spread, ...]) -> Any:
         group = self._group("covariance")
         group.visible = False
-        for row, one in enumerate(self.scene.objects):
-            if one.spread is not None:
-                _ellipsoid(self.server, f"/covariance/{row}", one.spread, "#111111", opacity=0.5)
+        for row, one in enumerate(spreads):
+            _ellipsoid(self.server, f"/covariance/{row}", one, "#111111", opacity=0.5)
         return group
 
     def _controls(self, parents: dict[str, Any]) -> None:
@@ -208,7 +206,7 @@ def place_eye(scene: Scene) -> tuple[Floats, Floats, float]:
 def _ellipsoid(
     server: ViserServer,
     name: str,
-    one: SceneObject,
+    one: SceneObject | Spread,
     color: str,
     *,
     opacity: float,

@@ -16,7 +16,7 @@ import numpy as np
 
 from dqslam._checks import Floats
 from dqslam.io.files import write_text
-from dqslam.view.scene import ESTIMATE, ODOMETRY, TRUTH, Scene, SceneObject
+from dqslam.view.scene import ESTIMATE, ODOMETRY, TRUTH, Scene, SceneObject, Spread
 
 _STATIC = Path(__file__).with_name("static")
 # Micrometres and microradians: more would only make the file larger.
@@ -46,6 +46,8 @@ def _describe(scene: Scene) -> dict[str, Any]:
         "timestamps": scene.timestamps.tolist(),
         "estimate": _rounded(scene.estimate),
         "odometry": _rounded(scene.odometry),
+        "cameras": scene.cameras.tolist(),
+        "poseSpreads": [_spread(one) for one in scene.pose_spreads],
         "truth": [_rounded(run) for run in scene.truth],
         "objects": [_object(one) for one in scene.objects],
         "trueObjects": [_object(one) for one in scene.true_objects],
@@ -61,7 +63,7 @@ def _describe(scene: Scene) -> dict[str, Any]:
 
 
 def _object(one: SceneObject) -> dict[str, Any]:
-    covariance = one.center_covariance
+    spread = one.spread
     return {
         "id": one.id,
         "className": one.class_name,
@@ -69,8 +71,16 @@ def _object(one: SceneObject) -> dict[str, Any]:
         "center": _rounded(one.center),
         "semiAxes": None if one.semi_axes is None else _rounded(one.semi_axes),
         "orientation": None if one.orientation_xyzw is None else _rounded(one.orientation_xyzw),
-        "centerCovariance": None if covariance is None else covariance.tolist(),
+        "spread": None if spread is None else _spread(spread),
         "numbers": one.numbers,
+    }
+
+
+def _spread(one: Spread) -> dict[str, Any]:
+    return {
+        "center": _rounded(one.center),
+        "semiAxes": one.semi_axes.tolist(),  # which may be far below a micrometre
+        "orientation": _rounded(one.orientation_xyzw),
     }
 
 

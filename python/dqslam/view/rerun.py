@@ -10,7 +10,7 @@ import numpy as np
 from dqslam._checks import Floats
 from dqslam._files import whole_file
 from dqslam.view.picture import outlines_in_image
-from dqslam.view.scene import ESTIMATE, ODOMETRY, TRUTH, Scene, SceneObject, rgb
+from dqslam.view.scene import ESTIMATE, ODOMETRY, TRUTH, Scene, SceneObject, Spread, rgb
 
 if TYPE_CHECKING:
     from rerun import RecordingStream
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 def write_rerun(scene: Scene, path: str | Path) -> None:
     """Write an ``.rrd`` file; needs ``dqslam[rerun]``.
 
-    ``world/``: ``estimate``, ``odometry``, ``truth``, ``objects``, ``covariance``, ``true_objects``
+    ``world/``: ``estimate``, ``odometry``, ``truth``, ``objects``, ``true_objects``, ``covariance``
     once and for all; on the timelines ``time`` [s] and ``image`` the ``camera``, and in its image
     ``boxes`` and ``outlines``.
     """
@@ -40,6 +40,7 @@ def write_rerun(scene: Scene, path: str | Path) -> None:
 def _log_world(stream: RecordingStream, scene: Scene) -> None:
     import rerun
 
+    _log_up(stream, scene.up)
     paths = (
         ("estimate", (scene.estimate,), ESTIMATE),
         ("odometry", (scene.odometry,), ODOMETRY),
@@ -53,7 +54,8 @@ def _log_world(stream: RecordingStream, scene: Scene) -> None:
     true = list(scene.true_objects)
     _log_objects(stream, "true_objects", true, [TRUTH for _ in true], labels=False)
     spreads = [one.spread for one in scene.objects if one.spread is not None]
-    _log_objects(stream, "covariance", spreads, ["#111111" for _ in spreads], labels=False)
+    _log_spreads(stream, "covariance/objects", spreads)
+    _log_spreads(stream, "covariance/poses", list(scene.pose_spreads))
     camera = scene.camera
     pinhole = rerun.Pinhole(
         focal_length=[camera.fx, camera.fy],
@@ -63,6 +65,17 @@ def _log_world(stream: RecordingStream, scene: Scene) -> None:
         camera_xyz=rerun.ViewCoordinates.RDF,
     )
     stream.log("world/camera", pinhole, static=True)
+
+
+def _log_up(stream: RecordingStream, up: Floats) -> None:
+    """Log which axis of the world is up, if one is."""
+    import rerun
+
+    axis = int(np.argmax(np.abs(up)))
+    if abs(up[axis]) > 1.0 - 1e-9:
+        direction = "UP" if up[axis] > 0.0 else "DOWN"
+        name = f"RIGHT_HAND_{'XYZ'[axis]}_{direction}"
+        stream.log("world", getattr(rerun.ViewCoordinates, name), static=True)
 
 
 def _log_objects(
@@ -92,6 +105,19 @@ def _log_objects(
         centers = [objects[k].center for k in points]
         dots = rerun.Points3D(centers, colors=[rgb(colors[k]) for k in points])
         stream.log(f"world/{name}/points", dots, static=True)
+
+
+def _log_spreads(stream: RecordingStream, name: str, spreads: list[Spread]) -> None:
+    import rerun
+
+    if spreads:
+        ellipsoids = rerun.Ellipsoids3D(
+            centers=[one.center for one in spreads],
+            half_sizes=[one.semi_axes for one in spreads],
+            quaternions=[one.orientation_xyzw for one in spreads],
+            colors=[(17, 17, 17)],
+        )
+        stream.log(f"world/{name}", ellipsoids, static=True)
 
 
 def _log_frame(stream: RecordingStream, scene: Scene, frame: int) -> None:

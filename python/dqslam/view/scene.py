@@ -7,7 +7,7 @@ The world is that of the estimate, metres; the truth is moved into it. Poses are
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -24,8 +24,23 @@ ODOMETRY, TRUTH, ESTIMATE = "#0072B2", "#009E73", "#D55E00"
 CLASSES = ("#E69F00", "#56B4E9", "#CC79A7", "#882255", "#999933", "#332288", "#44AA99", "#AA4499")
 # Where so many times the usual number of poses has no true one, nothing is drawn between.
 GAP = 5.0
-# Of the centre, shown where covariances are.
+# Shown where covariances are.
 SIGMAS = 3.0
+CAMERAS = 60
+# Square metres: no axis of an ellipsoid is zero.
+_NOTHING = 1e-18
+
+
+@dataclass(frozen=True, eq=False)
+class Spread:
+    """The ellipsoid of ``SIGMAS`` standard deviations of a place."""
+
+    center: Floats
+    """Metres, shape (3,)."""
+    semi_axes: Floats
+    """Metres, shape (3,)."""
+    orientation_xyzw: Floats
+    """world_from_ellipsoid, shape (4,)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,19 +71,11 @@ class SceneObject:
         return _core.ellipsoid_from_axes(self.center, self.semi_axes, self.orientation_xyzw)
 
     @property
-    def spread(self) -> SceneObject | None:
-        """The ellipsoid of ``SIGMAS`` standard deviations of the centre."""
-        from scipy.spatial.transform import Rotation
-
+    def spread(self) -> Spread | None:
+        """How uncertain the centre is."""
         if self.center_covariance is None:
             return None
-        squares, axes = np.linalg.eigh(self.center_covariance)
-        axes[:, 0] *= np.linalg.det(axes)  # a rotation, not a reflection
-        return replace(
-            self,
-            semi_axes=SIGMAS * np.sqrt(squares.clip(min=1e-18)),
-            orientation_xyzw=Rotation.from_matrix(axes).as_quat(),
-        )
+        return spread_of(self.center, self.center_covariance)
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,6 +112,10 @@ class Scene:
     """Shape (n, 7)."""
     odometry: Floats
     """Shape (n, 7)."""
+    cameras: Ints
+    """Rows of the poses whose cameras are drawn: not all of many."""
+    pose_spreads: tuple[Spread, ...]
+    """How uncertain positions are, where known, of as many."""
     truth: tuple[Floats, ...]
     """True poses at the times that have one, in runs without a gap, each of shape (t, 7)."""
     objects: tuple[SceneObject, ...]
@@ -118,6 +129,16 @@ def rgb(color: str) -> tuple[int, int, int]:
     """Return red, green and blue, 0 to 255, of ``#rrggbb``."""
     red, green, blue = bytes.fromhex(color[1:])
     return red, green, blue
+
+
+def spread_of(center: Floats, covariance: Floats) -> Spread:
+    """Return the spread of a place (3,) [m] with a covariance (3, 3) [m^2]."""
+    from scipy.spatial.transform import Rotation
+
+    squares, axes = np.linalg.eigh(covariance)
+    axes[:, 0] *= np.linalg.det(axes)  # a rotation, not a reflection
+    semi_axes = SIGMAS * np.sqrt(squares.clip(min=_NOTHING))
+    return Spread(center, semi_axes, Rotation.from_matrix(axes).as_quat())
 
 
 def build_scene(
@@ -162,12 +183,33 @@ def build_scene(
         timestamps=results.timestamps,
         estimate=results.world_from_camera,
         odometry=results.odometry,
+        cameras=_some(np.arange(len(results.timestamps))),
+        pose_spreads=_pose_spreads(results),
         truth=truth,
         objects=_mapped_objects(results, evaluation, colors),
         true_objects=true_objects,
         boxes=_boxes(results.boxes, results.objects),
         overview=overview(results, evaluation),
     )
+
+
+def _some(rows: Ints) -> Ints:
+    """Return at most ``CAMERAS`` of some rows, spread evenly."""
+    return rows[:: max(1, -(-len(rows) // CAMERAS))]
+
+
+def _pose_spreads(results: Results) -> tuple[Spread, ...]:
+    from scipy.spatial.transform import Rotation
+
+    # In the frame of the camera; the first pose is exact, which is no ellipsoid.
+    covariance = results.covariance[:, :3, :3]
+    known = np.isfinite(covariance).all(axis=(1, 2)) & (covariance != 0.0).any(axis=(1, 2))
+    spreads = []
+    for row in _some(np.flatnonzero(known)):
+        turn = Rotation.from_quat(results.world_from_camera[row, 3:]).as_matrix()
+        in_world = turn @ covariance[row] @ turn.T
+        spreads.append(spread_of(results.world_from_camera[row, :3], in_world))
+    return tuple(spreads)
 
 
 def _gaps(rows: Ints) -> Ints:

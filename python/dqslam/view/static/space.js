@@ -3,7 +3,6 @@
 "use strict";
 
 const CIRCLE = Array.from({ length: 49 }, (_, k) => [Math.cos(k * Math.PI / 24), Math.sin(k * Math.PI / 24)]);
-const SIGMAS = 3;
 
 class SpaceView {
   /**
@@ -66,6 +65,7 @@ class SpaceView {
       for (const run of this.paths[name]) this.addPath(items, name, run, name === "truth" ? Infinity : frame);
     }
     if (shown.cameras) this.addCameras(items, frame);
+    if (shown.covariance) this.scene.poseSpreads.forEach((spread) => this.addSpread(items, spread));
     if (shown.truth) this.scene.trueObjects.forEach((_, row) => this.addTrue(items, row, selected));
     this.scene.objects.forEach((_, row) => this.addObject(items, row, shown, selected));
     items.sort((a, b) => b.depth - a.depth).forEach((item) => item.draw());
@@ -135,9 +135,8 @@ class SpaceView {
 
   addCameras(items, frame) {
     const { estimate } = this.scene;
-    const step = Math.ceil(estimate.length / 60);
     const size = 0.022 * this.orbit.radius;
-    for (let k = 0; k < estimate.length; k += step) {
+    for (const k of this.scene.cameras) {
       if (k !== frame) this.addCamera(items, estimate[k], size, { strokeStyle: "#7d8894", globalAlpha: 0.55 });
     }
     this.addCamera(items, estimate[frame], 2.5 * size, { strokeStyle: "#111", lineWidth: 1.8 }, frame);
@@ -185,11 +184,15 @@ class SpaceView {
         this.counts.ellipsoids += 1;
       }, style);
     }
-    if (!shown.covariance || !object.centerCovariance) return;
-    const shape = object.centerCovariance.map((line) => line.map((value) => SIGMAS ** 2 * value));
-    const outline = geometry.outlineOf(this.eye.view, this.eye.lens, object.center, shape);
+    if (shown.covariance && object.spread) this.addSpread(items, object.spread);
+  }
+
+  /** Add the ellipsoid of a covariance. */
+  addSpread(items, { center, semiAxes, orientation }) {
+    const shape = geometry.shapeOf(semiAxes, orientation);
+    const outline = geometry.outlineOf(this.eye.view, this.eye.lens, center, shape);
     if (!outline) return;
-    // Drawn after its object, which mostly is around it.
+    // Before the object itself, which mostly is around it.
     items.push({ depth: outline.depth - 1e-6, draw: () => {
       this.fill(outline, "#ffffff70", { strokeStyle: "#111", lineWidth: 1.2, setLineDash: [3, 2] });
       this.counts.covariances += 1;

@@ -48,11 +48,11 @@
   function makeSwitches() {
     const titles = {
       estimate: "estimate", odometry: "odometry", truth: "truth", cameras: "cameras", objects: "objects",
-      names: "names", covariance: "covariance, 3σ of centres", follow: "follow the camera",
+      names: "names", covariance: "covariance, 3σ", follow: "follow the camera",
     };
     const absent = {
       truth: !scene.truth.length, objects: !scene.objects.length, names: !scene.objects.length,
-      covariance: !scene.objects.some((object) => object.centerCovariance),
+      covariance: !scene.poseSpreads.length && !scene.objects.some((object) => object.spread),
     };
     for (const [name, title] of Object.entries(titles)) {
       if (absent[name]) { shown[name] = false; continue; }
