@@ -3,7 +3,6 @@
 Run by hand after a change: ``./run python docs/figures/plots.py``.
 """
 
-import shutil
 import tempfile
 from pathlib import Path
 
@@ -53,21 +52,29 @@ def paint(truth, camera, pose, path):
 def draw(folder):
     """Draw all figures into a folder, and copy those that the page shows."""
     estimate("paper", 7, folder / "paper")
-    main(["plot", str(folder / "paper"), "--quiet"])
+    main(["plot", str(folder / "paper"), "--format", "png", "--quiet"])
     estimate("orbit", 1, folder / "orbit")
     recording, truth = simulate(load_scenario("orbit"), seed=1)
     results = io.load_results(folder / "orbit" / "results")
     images = folder / "images"
     images.mkdir()
     paint(truth, recording.camera, POSE, images / f"{results.timestamps[POSE]:.6f}.png")
-    main(["plot", str(folder / "orbit"), "--images", str(images), "--quiet"])
-    for source, name in (("paper", "map"), ("paper", "position_error"), ("orbit", "boxes")):
-        shutil.copy(folder / source / "figures" / f"{name}.svg", HERE / f"plot_{name}.svg")
-    shutil.copy(folder / "paper" / "figures" / "residuals.svg", HERE / "plot_residuals.svg")
+    main(["plot", str(folder / "orbit"), "--images", str(images), "--format", "png", "--quiet"])
     (still,) = (folder / "orbit" / "figures" / "images").iterdir()
-    Image.open(still).convert("RGB").quantize(128, dither=Image.Dither.NONE).save(
-        HERE / "plot_images.png", optimize=True
-    )
+    keep(still, "images")
+    for source, name in (
+        ("paper", "map"),
+        ("paper", "position_error"),
+        ("paper", "residuals"),
+        ("orbit", "boxes"),
+    ):
+        keep(folder / source / "figures" / f"{name}.png", name)
+
+
+def keep(figure, name):
+    """Put a figure beside this file, with few colours."""
+    image = Image.open(figure).convert("RGB").quantize(128, dither=Image.Dither.NONE)
+    image.save(HERE / f"plot_{name}.png", optimize=True)
 
 
 if __name__ == "__main__":
