@@ -41,6 +41,7 @@ nitpick_ignore_regex = [
     ("py:.*", r"(numpy|np|pathlib|collections|typing|pydantic|typer|enum|matplotlib)\..*"),
     ("py:.*", r"(Any|ArrayLike|NDArray|ndarray|float64|int64|bool|Align|Ids|TypeAliasForwardRef)"),
     ("py:.*", r"dict\[.*|dqslam\.experiment\.methods\.Settings|dqslam\.io\.results\.save\..*"),
+    ("py:.*", r"dqslam\.(view\.scene|sweep|plot)\..*"),
     ("py:.*", r"dqslam\.associate\.scene_map\.SceneMap"),  # the inside of an association
 ]
 autodoc_member_order = "bysource"
