@@ -79,9 +79,9 @@ void BlockCholesky::AddUpdates(int f) {
   }
   for (int k = front.child; k < elimination_.fronts[f + 1].child; ++k) {
     const Child& child = elimination_.children[k];
-    const Run* const end = elimination_.runs.data() + elimination_.children[k + 1].run;
+    const RowRun* const end = elimination_.runs.data() + elimination_.children[k + 1].run;
     const std::ptrdiff_t size = elimination_.fronts[child.front].below;
-    for (const Run* run = elimination_.runs.data() + child.run; run != end; ++run) {
+    for (const RowRun* run = elimination_.runs.data() + child.run; run != end; ++run) {
       for (int c = 0; c < run->length; ++c) {
         const double* from = Update(child.front) + (run->from + c) * size;
         const int column = run->to + c;
@@ -90,7 +90,7 @@ void BlockCholesky::AddUpdates(int f) {
                 ? Factor(f) + std::ptrdiff_t{column} * front.rows()
                 : Update(f) + std::ptrdiff_t{column - front.pivots} * front.below - front.pivots;
         for (int r = c; r < run->length; ++r) to[run->to + r] += from[run->from + r];
-        for (const Run* next = run + 1; next != end; ++next) {
+        for (const RowRun* next = run + 1; next != end; ++next) {
           for (int r = 0; r < next->length; ++r) to[next->to + r] += from[next->from + r];
         }
       }

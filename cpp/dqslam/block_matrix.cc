@@ -1,6 +1,7 @@
 #include "dqslam/block_matrix.h"
 
 #include <algorithm>
+#include <numeric>
 #include <stdexcept>
 #include <string>
 
@@ -32,23 +33,35 @@ std::pair<int, int> Ascending(const std::pair<int, int>& pair, size_t k, int blo
   return {std::min(i, j), std::max(i, j)};
 }
 
+// Items by key(item), in [0, keys): counting, for pairs of a large graph come by the million.
+template <typename Key>
+std::vector<int> StableSort(const std::vector<int>& items, int keys, const Key& key) {
+  std::vector<int> next(keys + 1, 0), sorted(items.size());
+  for (const int item : items) ++next[key(item) + 1];
+  std::partial_sum(next.begin(), next.end(), next.begin());
+  for (const int item : items) sorted[next[key(item)]++] = item;
+  return sorted;
+}
+
 }  // namespace
 
 BlockMatrix::BlockMatrix(std::vector<int> sizes, const std::vector<std::pair<int, int>>& pairs)
     : sizes_(std::move(sizes)), offsets_(Offsets(sizes_)) {
-  coupled_.reserve(pairs.size());
+  std::vector<std::pair<int, int>> asked;
+  asked.reserve(pairs.size());
   for (size_t k = 0; k < pairs.size(); ++k) {
-    coupled_.push_back(Ascending(pairs[k], k, num_blocks()));
+    asked.push_back(Ascending(pairs[k], k, num_blocks()));
   }
-  const std::vector<std::pair<int, int>> asked = coupled_;
-  std::sort(coupled_.begin(), coupled_.end());
-  coupled_.erase(std::unique(coupled_.begin(), coupled_.end()), coupled_.end());
+  std::vector<int> order(pairs.size());
+  std::iota(order.begin(), order.end(), 0);
+  order = StableSort(order, num_blocks(), [&](int k) { return asked[k].second; });
+  order = StableSort(order, num_blocks(), [&](int k) { return asked[k].first; });
+  index_of_pair_.resize(pairs.size());
+  for (const int k : order) {
+    if (coupled_.empty() || coupled_.back() != asked[k]) coupled_.push_back(asked[k]);
+    index_of_pair_[k] = num_off_diagonal() - 1;
+  }
   coupled_.shrink_to_fit();
-  index_of_pair_.reserve(asked.size());
-  for (const std::pair<int, int>& pair : asked) {
-    const auto found = std::lower_bound(coupled_.begin(), coupled_.end(), pair);
-    index_of_pair_.push_back(static_cast<int>(found - coupled_.begin()));
-  }
 
   std::ptrdiff_t start = 0;
   for (const int size : sizes_) {

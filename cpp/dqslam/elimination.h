@@ -30,7 +30,7 @@ struct PlacedBlock {
 };
 
 /// Rows from `from` on of a child's update are rows from `to` on of its parent's front.
-struct Run {
+struct RowRun {
   int from, to, length;
 };
 
@@ -50,7 +50,7 @@ struct Elimination {
   std::vector<int> rows;      ///< below the pivots, in the order of elimination, ascending
   std::vector<PlacedBlock> blocks;
   std::vector<Child> children;  ///< ascending; the last one only ends the one before
-  std::vector<Run> runs;
+  std::vector<RowRun> runs;
   std::ptrdiff_t stack_size[2] = {0, 0};
 };
 
