@@ -11,11 +11,11 @@ import pytest
 
 import planted
 from browser import open_page, start_browser
+from dqslam._colors import ODOMETRY
 from dqslam.cli import main
 from dqslam.io import load_results, read_trajectory, read_true_objects
 from dqslam.view import build_scene, rgb, serve
 from dqslam.view.live import FIELD_OF_VIEW, place_eye
-from dqslam.view.scene import ODOMETRY
 
 viser = pytest.importorskip("viser", reason="viser is not installed")
 PORT = 18080

@@ -11,10 +11,10 @@ import pytest
 import planted
 from browser import open_page, start_browser
 from dqslam import _core
+from dqslam._colors import ESTIMATE, ODOMETRY, TRUTH
 from dqslam.cli import main
 from dqslam.io import load_results, read_trajectory, read_true_objects
-from dqslam.view import ESTIMATE, build_scene, rgb, write_page
-from dqslam.view.scene import ODOMETRY, TRUTH
+from dqslam.view import build_scene, rgb, write_page
 
 
 class Silent(SimpleHTTPRequestHandler):

@@ -57,7 +57,8 @@ def view(
     Needs `pip install 'dqslam[view]'`; --export and --ply do without, --rerun needs dqslam[rerun].
     """
     from dqslam import io
-    from dqslam.view import ESTIMATE, build_scene, rgb, write_page, write_rerun
+    from dqslam._colors import ESTIMATE
+    from dqslam.view import build_scene, rgb, write_page, write_rerun
 
     output = Output(quiet=quiet, as_json=json)
     results = io.load_results(results_in(directory))

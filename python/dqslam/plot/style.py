@@ -6,15 +6,22 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from dqslam._colors import BLUE as BLUE
+from dqslam._colors import ESTIMATE as ESTIMATE
+from dqslam._colors import GREEN as GREEN
+from dqslam._colors import GREY as GREY
+from dqslam._colors import ODOMETRY as ODOMETRY
+from dqslam._colors import ORANGE as ORANGE
+from dqslam._colors import PURPLE as PURPLE
+from dqslam._colors import SKY as SKY
+from dqslam._colors import TRUTH as TRUTH
+from dqslam._colors import VERMILLION as VERMILLION
+from dqslam._colors import YELLOW as YELLOW
 from dqslam._files import FileError, whole_file
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# Okabe and Ito. The paths have the paper's colours.
-BLUE, ORANGE, GREEN, VERMILLION = "#0072B2", "#E69F00", "#009E73", "#D55E00"
-SKY, PURPLE, YELLOW, GREY = "#56B4E9", "#CC79A7", "#F0E442", "#808080"
-ODOMETRY, TRUTH, ESTIMATE = BLUE, GREEN, VERMILLION
 # Of classes: first those that no path has.
 _CLASS_COLORS = (PURPLE, ORANGE, SKY, GREEN, BLUE, VERMILLION, YELLOW)
 _CLASS_LINES = ("-", (0, (4, 1)), (0, (1.5, 0.8)))

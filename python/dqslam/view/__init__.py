@@ -3,7 +3,6 @@
 from dqslam.view.live import serve as serve
 from dqslam.view.page import write_page as write_page
 from dqslam.view.rerun import write_rerun as write_rerun
-from dqslam.view.scene import ESTIMATE as ESTIMATE
 from dqslam.view.scene import Scene as Scene
 from dqslam.view.scene import SceneObject as SceneObject
 from dqslam.view.scene import build_scene as build_scene

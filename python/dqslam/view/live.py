@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dqslam._checks import Floats
+from dqslam._colors import ESTIMATE, ODOMETRY, TRUTH
 from dqslam.view.picture import draw_image
-from dqslam.view.scene import ESTIMATE, ODOMETRY, TRUTH, Scene, SceneObject, Spread, rgb
+from dqslam.view.scene import Scene, SceneObject, Spread, rgb
 
 if TYPE_CHECKING:
     from viser import ViserServer

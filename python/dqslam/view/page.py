@@ -15,8 +15,9 @@ from typing import Any
 import numpy as np
 
 from dqslam._checks import Floats
+from dqslam._colors import ESTIMATE, ODOMETRY, TRUTH
 from dqslam.io.files import write_text
-from dqslam.view.scene import ESTIMATE, ODOMETRY, TRUTH, Scene, SceneObject, Spread
+from dqslam.view.scene import Scene, SceneObject, Spread
 
 _STATIC = Path(__file__).with_name("static")
 # Micrometres and microradians: more would only make the file larger.

@@ -14,14 +14,14 @@ import numpy as np
 
 from dqslam import _core
 from dqslam._checks import Floats, Ints
+from dqslam._colors import ORANGE, PURPLE, SKY, TRUTH
 from dqslam.evaluate import Align, Alignment, up_direction
 from dqslam.evaluate_results import common_poses, evaluate_results
 from dqslam.io import BoxTable, MapObjects, Results, Trajectory, TrueObjects
 from dqslam.view.numbers import Numbers, object_numbers, overview, true_object_numbers
 
-# Okabe and Ito's, then Tol's: hues that the colour-blind can tell apart.
-ODOMETRY, TRUTH, ESTIMATE = "#0072B2", "#009E73", "#D55E00"
-CLASSES = ("#E69F00", "#56B4E9", "#CC79A7", "#882255", "#999933", "#332288", "#44AA99", "#AA4499")
+# Those that no path has, then more of the same kind (Tol's).
+CLASSES = (ORANGE, SKY, PURPLE, "#882255", "#999933", "#332288", "#44AA99", "#AA4499")
 # Where so many times the usual number of poses has no true one, nothing is drawn between.
 GAP = 5.0
 # Shown where covariances are.

@@ -105,7 +105,7 @@ class SpaceView {
   drawGrid() {
     const { orbit } = this;
     const [east, north] = orbit.level(orbit.target);
-    const rough = orbit.radius / 5, power = 10 ** Math.floor(Math.log10(rough));
+    const rough = orbit.distance / 10, power = 10 ** Math.floor(Math.log10(rough));
     this.step = power * [1, 2, 5, 10].find((factor) => factor * power >= rough);
     const count = 10, half = count * this.step;
     const e = Math.round(east / this.step) * this.step, n = Math.round(north / this.step) * this.step;
@@ -194,7 +194,7 @@ class SpaceView {
     if (!outline) return;
     // Before the object itself, which mostly is around it.
     items.push({ depth: outline.depth - 1e-6, draw: () => {
-      this.fill(outline, "#ffffff70", { strokeStyle: "#111", lineWidth: 1.2, setLineDash: [3, 2] });
+      this.fill(outline, "#ffffff30", { strokeStyle: "#111", lineWidth: 1.2, setLineDash: [3, 2] });
       this.counts.covariances += 1;
     } });
   }
