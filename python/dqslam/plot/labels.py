@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 _DIRECTIONS = np.array([(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)])
 _DISTANCES = (3.0, 8.0, 14.0, 22.0)  # points from the edge of the named
 _LEADER_FROM = 8.0
+_APART = 0.8  # points around a text
 
 
 def place_labels(
@@ -47,7 +48,7 @@ def place_labels(
             continue
         where, distance = place
         taken.append(where)
-        line = {"arrowstyle": "-", "linewidth": 0.4, "color": color}
+        line = {"arrowstyle": "-", "linewidth": 0.4, "color": color, "shrinkA": 0, "shrinkB": 0}
         target, middle = (to_data((one[:2] + one[2:]) / 2.0) for one in (box, where))
         axes.annotate(
             text,
@@ -57,6 +58,7 @@ def place_labels(
             ha="center",
             va="center",
             color="0.15",
+            bbox={"pad": 0.5, "facecolor": "none", "linewidth": 0.0},  # where the line ends
             arrowprops=line if distance >= _LEADER_FROM else None,
             zorder=6,
             path_effects=[withStroke(linewidth=1.2, foreground="white")],
@@ -77,7 +79,7 @@ def _free_place(
     box: Floats, size: Floats, frame: Floats, taken: Sequence[Floats], per_point: float
 ) -> tuple[Floats, float] | None:
     """Return the box (4,) of a text of a size, in pixels, and its distance in points."""
-    half = size / 2.0
+    half = size / 2.0 + _APART * per_point
     middle, reach = (box[:2] + box[2:]) / 2.0, (box[2:] - box[:2]) / 2.0
     others = np.array(taken)
     for distance in _DISTANCES:
