@@ -7,21 +7,19 @@ import numpy as np
 
 from dqslam._checks import Floats
 from dqslam.ablation import WRONG_KINDS, WRONG_SHARE, AblationTable, Row
+from dqslam.plot.style import BLUE, VERMILLION, new_figure, save_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_KIND_STYLES = {"random": ("#0072B2", "o"), "structured": ("#D55E00", "s")}
+_DPI = 110
+_KIND_STYLES = {"random": (BLUE, "o"), "structured": (VERMILLION, "s")}
 _WORST_SHOWN = 100.0  # error over bound
 
 
 def plot_ablation(table: AblationTable, path: str | Path) -> None:
     """Draw the clean variants as two maps of numbers, and the robust back ends below."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(11.0, 6.6), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(11.0, 6.6)
     grid = figure.add_gridspec(2, 2)
     clean = [row for row in table.rows if row.variant.wrong_ids is None]
     _draw_map(
@@ -41,7 +39,7 @@ def plot_ablation(table: AblationTable, path: str | Path) -> None:
         colors="RdYlGn_r",
     )
     _draw_back_ends(figure.add_subplot(grid[1, :]), table)
-    figure.savefig(path, dpi=110)
+    save_figure(figure, path, dpi=_DPI)
 
 
 def label(name: str) -> str:

@@ -6,31 +6,37 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dqslam.degeneracy import ESTIMATORS, STARTS, DegeneracyTable
+from dqslam.plot.style import (
+    BLUE,
+    GREEN,
+    ORANGE,
+    PURPLE,
+    VERMILLION,
+    new_figure,
+    save_figure,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-COLORS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7")  # Okabe and Ito
-_ESTIMATOR_COLORS = {"paper": "#D55E00", "dqslam": "#0072B2"}
+_DPI = 110
+_MOTION_COLORS = (BLUE, ORANGE, GREEN, PURPLE)
+_ESTIMATOR_COLORS = {"paper": VERMILLION, "dqslam": BLUE}
 _START_MARKERS = {"SVD": "s", "identity": "D", "sphere": "o"}
 _ZERO = 1e-9  # what is exactly zero but for rounding is drawn here
 
 
 def plot_degeneracy(table: DegeneracyTable, path: str | Path) -> None:
     """Draw the singular values of each motion, and the errors of each estimator and start."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(10.5, 4.2), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(10.5, 4.2)
     left, right = figure.subplots(1, 2, width_ratios=(1.0, 1.2))
     _draw_singular_values(left, table)
     _draw_errors(right, table)
-    figure.savefig(path, dpi=110)
+    save_figure(figure, path, dpi=_DPI)
 
 
 def _draw_singular_values(axes: "Axes", table: DegeneracyTable) -> None:
-    for row, color, marker in zip(table.motions, COLORS, "v^os", strict=True):
+    for row, color, marker in zip(table.motions, _MOTION_COLORS, "v^os", strict=True):
         values = np.maximum(row.singular_values, _ZERO)
         axes.semilogy(
             np.arange(1, 11), values, color=color, marker=marker, markersize=5, label=row.motion

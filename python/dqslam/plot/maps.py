@@ -9,18 +9,18 @@ import numpy as np
 from dqslam import _core
 from dqslam._checks import Floats
 from dqslam.estimate import Estimate, quadric_shapes
+from dqslam.plot.above import outline
+from dqslam.plot.style import ESTIMATE, ODOMETRY, TRUTH, new_figure, save_figure
 from dqslam.recording import Truth
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# The paper's colours, in shades that the colour-blind can tell apart (Okabe and Ito).
-ODOMETRY, TRUTH, ESTIMATE = "#0072B2", "#009E73", "#D55E00"
 _COLUMNS = 3
 _AROUND_M = 8.0  # shown around the truth at most: what has diverged must not shrink the rest
 _PANEL_INCHES = 4.2
-_CIRCLE = np.stack([f(np.linspace(0.0, 2.0 * np.pi, 73)) for f in (np.cos, np.sin)])
+_DPI = 150
 
 
 def plot_maps(maps: Sequence[tuple[str, Estimate, Truth]], path: str | Path) -> None:
@@ -29,18 +29,13 @@ def plot_maps(maps: Sequence[tuple[str, Estimate, Truth]], path: str | Path) -> 
     Trajectories are lines, objects their outlines from above. A true object that is no ellipsoid
     is a disc of its volume, a mapped one that is none a cross.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     if not maps:
         raise ValueError("there are no maps to draw")
     columns = min(_COLUMNS, len(maps))
     rows = -(-len(maps) // columns)
     low, high = _window(maps)
     height = _PANEL_INCHES * (high - low)[1] / (high - low)[0]
-    size = (_PANEL_INCHES * columns + 0.6, (height + 0.25) * rows + 0.9)
-    figure = Figure(figsize=size, layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(_PANEL_INCHES * columns + 0.6, (height + 0.25) * rows + 0.9)
     grid = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
     for axes, (title, estimate, truth) in zip(grid.flat, maps, strict=False):
         _draw_map(axes, estimate, truth)
@@ -54,7 +49,7 @@ def plot_maps(maps: Sequence[tuple[str, Estimate, Truth]], path: str | Path) -> 
     for axes in grid[:, 0]:
         axes.set_ylabel("y [m]")
     _draw_legend(figure, crosses=any(not estimate.is_ellipsoid.all() for _, estimate, _ in maps))
-    figure.savefig(path, dpi=150)
+    save_figure(figure, path, dpi=_DPI)
 
 
 def _window(maps: Sequence[tuple[str, Estimate, Truth]]) -> tuple[Floats, Floats]:
@@ -73,8 +68,8 @@ def _draw_map(axes: "Axes", estimate: Estimate, truth: Truth) -> None:
     _draw_path(axes, truth.poses, color=TRUTH, linewidth=3.0, alpha=0.8)
     _draw_path(axes, estimate.poses, color=ESTIMATE, linewidth=1.1)
     axes.plot(*truth.poses[0, :2], "o", color="black", markersize=4, zorder=3)
-    for outline in _true_outlines(truth):
-        axes.fill(*outline, color=TRUTH, alpha=0.4, linewidth=0)
+    for one in _true_outlines(truth):
+        axes.fill(*one, color=TRUTH, alpha=0.4, linewidth=0)
     objects = zip(estimate.centers, estimate.shapes, estimate.is_ellipsoid, strict=True)
     for center, shape, is_ellipsoid in objects:
         if is_ellipsoid:
@@ -120,4 +115,4 @@ def _true_outlines(truth: Truth) -> list[Floats]:
 
 def _outline(center: Floats, shape: Floats) -> Floats:
     """Return the outline from above, (2, n), of an ellipsoid: an ellipse of shape S_xy."""
-    return np.asarray(center[:2, None] + np.linalg.cholesky(shape[:2, :2]) @ _CIRCLE)
+    return outline(center[:2], shape[:2, :2])
