@@ -1,5 +1,6 @@
 """Settings of the site: ./run docs builds it from this folder into build/docs."""
 
+import os
 import re
 import sys
 from pathlib import Path
@@ -67,6 +68,8 @@ html_theme_options = {
     "dark_css_variables": {"color-brand-primary": "#56B4E9", "color-brand-content": "#56B4E9"},
 }
 
+# Where the tests look for real recordings too; an example does without where there are none.
+os.environ.setdefault("DQSLAM_REALDATA", str(ROOT.parent / "shared" / "realdata"))
 sphinx_gallery_conf = {
     "examples_dirs": [str(ROOT / "examples")],
     "gallery_dirs": [str(generated / "gallery")],
