@@ -258,6 +258,20 @@ def test_the_command_and_a_page_without_a_server(browser, tmp_path, capsys):
     assert (shown["ellipsoids"], shown["truth"], shown["trueObjects"]) == (5, 19, 0)
 
 
+def test_one_pose_and_no_object(browser, tmp_path):
+    results = planted.write_planted(tmp_path).results
+    for name in ("trajectory.txt", "odometry.txt"):
+        lines = (results / name).read_text().splitlines(keepends=True)
+        (results / name).write_text(next(line for line in lines if not line.startswith("#")))
+    (results / "boxes.csv").unlink()
+    (results / "map.json").write_text('{"objects": [], "dropped": []}')
+    write_page(build_scene(load_results(results)), tmp_path / "page")
+    with open_page(browser, f"file://{tmp_path}/page/index.html") as page:
+        page.wait_for_function("window.onScreen")
+        assert on_screen(page)["cameras"] == 1
+        assert page.locator("#status").inner_text() == "image 1 of 1, 100 s: 0 boxes, 0 objects"
+
+
 def test_hostile_names_stay_text(browser, tmp_path):
     files = planted.write_planted(tmp_path)
     path = files.results / "map.json"
