@@ -7,7 +7,9 @@ pytest.importorskip("matplotlib")
 from PIL import Image
 
 import planted
+import realdata
 from dqslam.cli import main
+from dqslam.evaluate import up_direction
 from dqslam.io import load_results
 
 FIGURES = ["boxes", "map", "position_error", "residuals", "rotation_error"]
@@ -62,6 +64,32 @@ def test_a_simulated_recording_has_its_truth_beside(tmp_path, capsys):
         code, said = run(capsys, given, "--out", tmp_path / "of" / given.name, "--quiet")
         assert (code, said.out) == (0, "")
         assert names(tmp_path / "of" / given.name) == [f"{name}.svg" for name in FIGURES]
+
+
+def test_a_table_top_with_images_by_their_numbers(tmp_path, capsys):
+    """Its times are the numbers of images, its objects lie on a table: z is up."""
+    folder = realdata.recording("bop_lmo")
+    segment = folder / "seg_0703_1001"
+    results = tmp_path / "results"
+    code = main(
+        [
+            "run", "--quiet", "--camera", str(folder / "camera.json"), "--ids", "class_id",
+            "--odometry", str(segment / "groundtruth.txt"), "--out", str(results),
+            "--detections", str(segment / "detections_fasterrcnn.csv"), "--mode", "mapping",
+        ]
+    )  # fmt: skip
+    assert code == 0
+    (tmp_path / "rgb").mkdir()
+    for number in (703, 1001):
+        Image.new("RGB", (640, 480)).save(tmp_path / "rgb" / f"{number:06}.png")
+    code, said = run(
+        capsys, results, "--images", tmp_path / "rgb",
+        "--groundtruth", segment / "groundtruth.txt", "--objects", segment / "objects_gt.csv",
+    )  # fmt: skip
+    assert (code, said.err) == (0, "")
+    assert names(results / "figures" / "images") == ["000703.png", "001001.png"]
+    found = load_results(results)
+    assert up_direction(found.world_from_camera).tolist() == [0.0, 0.0, 1.0]
 
 
 def test_stills_of_some_frames(tmp_path, capsys, files, images):
