@@ -86,8 +86,8 @@ def plot(
 ) -> None:
     """Draw the results in DIR: the map from above, errors over time, residuals, boxes.
 
-    Needs `pip install 'dqslam[plot]'`. docs/plots.md says what each figure shows. Of a sweep, its
-    metrics against what was varied.
+    Of a sweep, its errors against what was varied. Needs the extra "plot"; docs/plots.md says what
+    each figure shows.
     """
     from dqslam import io
 
