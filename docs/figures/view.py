@@ -8,7 +8,6 @@ import shutil
 import tempfile
 from pathlib import Path
 
-from PIL import Image
 from playwright.sync_api import sync_playwright
 
 from dqslam.cli import main
@@ -29,16 +28,13 @@ def photograph(page):
     """Select an object half way, and take the picture."""
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=shutil.which("chromium"))
-        shown = browser.new_page(viewport={"width": 1200, "height": 760}, device_scale_factor=1.5)
+        shown = browser.new_page(viewport={"width": 1200, "height": 760}, device_scale_factor=1.25)
         shown.goto(page.as_uri())
         shown.locator("#time").fill("75")
         shown.locator("#objects button").nth(1).click()
         shown.wait_for_timeout(1000)
         shown.screenshot(path=PICTURE)
         browser.close()
-    Image.open(PICTURE).convert("RGB").quantize(128, dither=Image.Dither.NONE).save(
-        PICTURE, optimize=True
-    )
 
 
 if __name__ == "__main__":
