@@ -13,6 +13,7 @@ using Lists = std::vector<std::vector<int>>;
 // For graphs of boxes that takes less arithmetic than cutting the drive into halves.
 std::vector<int> MinimumDegree(const BlockMatrix& A) {
   const int blocks = A.num_blocks();
+  if (blocks == 0) return {};  // Eigen's sparse matrices read out of bounds
   Eigen::VectorXi entries = Eigen::VectorXi::Ones(blocks);
   for (int index = 0; index < A.num_off_diagonal(); ++index) ++entries[A.coupled(index).first];
   Eigen::SparseMatrix<char> lower(blocks, blocks);
