@@ -16,7 +16,7 @@ import dqslam as dq
 
 scenario = dq.load_scenario("paper")
 detector = scenario.detector.model_copy(update={"wrong_associations": 0.2})
-recording, truth = dq.simulate(scenario.model_copy(update={"detector": detector}), seed=5)
+recording, truth = dq.simulate(scenario.model_copy(update={"detector": detector}), seed=1)
 is_right = recording.detections.object_id == truth.box_object_id
 print(f"{len(is_right)} boxes, {(~is_right).sum()} of them with a wrong id")
 
@@ -33,7 +33,7 @@ estimates = {
     "GNC, Geman-McClure": dq.solve(graph, dq.SolveOptions(loss=dq.Loss.GNC_GM))[0],
 }
 figure, panels = plt.subplots(
-    1, 3, figsize=(10, 3.2), sharex=True, sharey=True, layout="constrained"
+    1, 3, figsize=(10, 3.6), sharex=True, sharey=True, layout="constrained"
 )
 for axes, (name, estimate) in zip(panels, estimates.items(), strict=True):
     report = dq.evaluate(estimate, truth)
@@ -43,9 +43,11 @@ for axes, (name, estimate) in zip(panels, estimates.items(), strict=True):
     axes.plot(*truth.center[:, :2].T, "s", color="#009E73", alpha=0.5)
     axes.plot(*estimate.centers[:, :2].T, "+", color="#D55E00")
     axes.set_title(f"{name}: {report.rmse_pos:.2f} m", fontsize=10)
-    axes.set(aspect="equal", xlabel="x [m]", xlim=(-16, 16), ylim=(-8, 20))
+    axes.set(aspect="equal", xlabel="x [m]", xlim=(-13, 16), ylim=(-7, 17))
 panels[0].set_ylabel("y [m]")
-panels[0].legend(frameon=False, fontsize=8, loc="lower left")
+figure.legend(
+    *panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False
+)
 plt.show()
 
 # %%
