@@ -90,6 +90,28 @@ Lists MergeColumns(const BlockMatrix& A, const std::vector<int>& order, const Li
   return merged;
 }
 
+// Orders the children of each front so that few updates wait at a time (Liu 1986): first the one
+// whose subtree needs the most memory besides the update that stays.
+void SortChildren(const BlockMatrix& A,
+                  const std::vector<int>& order,
+                  const Lists& below,
+                  Lists& children) {
+  std::vector<double> update(order.size()), peak(order.size());
+  for (size_t k = 0; k < order.size(); ++k) {
+    double rows = 0, waiting = 0;
+    for (const int row : below[k]) rows += A.size(order[row]);
+    update[k] = rows * rows;
+    std::stable_sort(children[k].begin(), children[k].end(), [&](int a, int b) {
+      return peak[a] - update[a] > peak[b] - update[b];
+    });
+    for (const int child : children[k]) {
+      peak[k] = std::max(peak[k], waiting + peak[child]);
+      waiting += update[child];
+    }
+    peak[k] = std::max(peak[k], waiting + update[k]);
+  }
+}
+
 // All that hangs from `roots`, each right after what hangs from itself.
 std::vector<int> Postorder(const Lists& children, const std::vector<int>& roots) {
   std::vector<int> pending = roots, reversed;
@@ -124,6 +146,7 @@ FrontTree::FrontTree(const BlockMatrix& A) {
     }
   }
 
+  SortChildren(A, minimum_degree, pattern, children);
   const std::vector<int> postorder = Postorder(children, roots);
   std::vector<int> position(A.num_blocks()), front_of(A.num_blocks());
   for (size_t front = 0; front < postorder.size(); ++front) {
