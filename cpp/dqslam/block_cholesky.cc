@@ -100,12 +100,15 @@ void BlockCholesky::AddUpdates(int f) {
 
 VectorXd BlockCholesky::Solve(const VectorXd& b) const {
   const Elimination& e = elimination_;
-  VectorXd x(b.size()), below;
+  int most_below = 0;
+  for (const Front& front : e.fronts) most_below = std::max(most_below, front.below);
+  VectorXd x(b.size()), workspace(most_below);
   for (Eigen::Index r = 0; r < b.size(); ++r) x[e.place[r]] = b[r];
   for (int f = 0; f < e.num_fronts(); ++f) {  // L y = b
     const Front& front = e.fronts[f];
     const double* factor = factor_.data() + front.factor;
     auto y = x.segment(front.pivot, front.pivots);
+    auto below = workspace.head(front.below);
     PivotsOf(factor, front).triangularView<Eigen::Lower>().solveInPlace(y);
     below.noalias() = BelowOf(factor, front) * y;
     for (int r = 0; r < front.below; ++r) x[e.rows[front.row + r]] -= below[r];
@@ -114,7 +117,7 @@ VectorXd BlockCholesky::Solve(const VectorXd& b) const {
     const Front& front = e.fronts[f];
     const double* factor = factor_.data() + front.factor;
     auto y = x.segment(front.pivot, front.pivots);
-    below.resize(front.below);
+    auto below = workspace.head(front.below);
     for (int r = 0; r < front.below; ++r) below[r] = x[e.rows[front.row + r]];
     y.noalias() -= BelowOf(factor, front).transpose() * below;
     PivotsOf(factor, front).transpose().triangularView<Eigen::Upper>().solveInPlace(y);

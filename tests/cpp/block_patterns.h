@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <utility>
 #include <vector>
 
@@ -39,6 +40,18 @@ inline Pattern ChainWithObjects(int poses, int pose_size, int objects, int loops
     const int block = static_cast<int>(pattern.sizes.size());
     pattern.sizes.push_back(1);
     pattern.pairs.insert(pattern.pairs.end(), {{last, first}, {first, block}, {block, last}});
+  }
+  return pattern;
+}
+
+/// A long drive: every 50 poses an object, seen from 100.
+inline Pattern Drive(int poses) {
+  Pattern pattern{std::vector<int>(poses, 3), {}};
+  for (int k = 1; k < poses; ++k) pattern.pairs.emplace_back(k - 1, k);
+  for (int first = 0; first + 100 <= poses; first += 50) {
+    const int block = static_cast<int>(pattern.sizes.size());
+    pattern.sizes.push_back(9);
+    for (int k = 0; k < 100; ++k) pattern.pairs.emplace_back(first + k, block);
   }
   return pattern;
 }

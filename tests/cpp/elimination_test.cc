@@ -102,5 +102,14 @@ TEST_P(EliminationTest, UpdatesDoNotMeetOnTheirStacks) {
   EXPECT_TRUE(waiting.empty());
 }
 
+TEST(Elimination, UpdatesThatWaitDoNotGrowWithTheDrive) {
+  const auto Stacks = [](int poses) {
+    const Pattern pattern = Drive(poses);
+    const Elimination elimination(BlockMatrix(pattern.sizes, pattern.pairs));
+    return elimination.stack_size[0] + elimination.stack_size[1];
+  };
+  EXPECT_LT(Stacks(10000), 1.5 * Stacks(1000));
+}
+
 }  // namespace
 }  // namespace dqslam

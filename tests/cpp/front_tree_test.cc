@@ -85,15 +85,7 @@ TEST(FrontTree, ComesInPostorder) {
 }
 
 double FactorEntries(int poses) {
-  Random random(2);
-  Pattern pattern{std::vector<int>(poses, 3), {}};
-  for (int k = 1; k < poses; ++k) pattern.pairs.emplace_back(k - 1, k);
-  for (int first = 0; first + 100 <= poses; first += 50) {  // each is seen from 100 poses
-    for (int k = 0; k < 100; ++k) {
-      pattern.pairs.emplace_back(first + k, static_cast<int>(pattern.sizes.size()));
-    }
-    pattern.sizes.push_back(9);
-  }
+  const Pattern pattern = Drive(poses);
   const BlockMatrix A(pattern.sizes, pattern.pairs);
   const FrontTree tree(A);
   double entries = 0;
