@@ -1,6 +1,8 @@
 #include "dqslam/block_cholesky.h"
 
 #include <algorithm>
+#include <stdexcept>
+#include <string>
 
 #include "dqslam/dense_front.h"
 
@@ -28,6 +30,15 @@ BlockCholesky::BlockCholesky(const BlockMatrix& A)
 }
 
 bool BlockCholesky::Factorize(const BlockMatrix& A, const VectorXd& damping) {
+  const size_t rows = elimination_.place.size(), blocks = elimination_.blocks.size();
+  if (static_cast<size_t>(A.rows()) != rows || static_cast<size_t>(damping.size()) != rows ||
+      static_cast<size_t>(A.num_blocks() + A.num_off_diagonal()) != blocks) {
+    throw std::invalid_argument(
+        "expected " + std::to_string(rows) + " rows in " + std::to_string(blocks) +
+        " blocks and a damping for each row, got " + std::to_string(A.rows()) + " rows in " +
+        std::to_string(A.num_blocks() + A.num_off_diagonal()) + " blocks and " +
+        std::to_string(damping.size()) + " dampings");
+  }
   VectorXd placed_damping(damping.size());
   for (Eigen::Index r = 0; r < damping.size(); ++r) {
     placed_damping[elimination_.place[r]] = damping[r];

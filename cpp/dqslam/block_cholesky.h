@@ -18,6 +18,7 @@ class BlockCholesky {
 
   /// `A` has the pattern that the constructor saw; one damping per row.
   /// False when A + diag(damping) is not positive definite or not finite: then there is no factor.
+  /// Throws std::invalid_argument when sizes differ from those of the constructor's matrix.
   bool Factorize(const BlockMatrix& A, const Eigen::VectorXd& damping);
 
   /// (A + diag(damping))^-1 b of the last call of Factorize, which must have returned true.

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <limits>
 #include <numeric>
+#include <stdexcept>
 
 #include "block_patterns.h"
 
@@ -213,6 +214,16 @@ TEST_F(BlockCholeskyRefuses, NegativeDamping) {
   damping[7] = -1e6;
   EXPECT_FALSE(cholesky.Factorize(A_, damping));
   EXPECT_TRUE(cholesky.Factorize(A_, Eigen::VectorXd::Zero(A_.rows())));
+}
+
+TEST_F(BlockCholeskyRefuses, AnotherPatternOrTooFewDampings) {
+  BlockCholesky cholesky(A_);
+  const Eigen::VectorXd damping = Eigen::VectorXd::Zero(A_.rows());
+  EXPECT_THROW(cholesky.Factorize(A_, damping.head(A_.rows() - 1)), std::invalid_argument);
+  Pattern other = pattern_;
+  other.pairs.pop_back();
+  EXPECT_THROW(cholesky.Factorize(BlockMatrix(other.sizes, other.pairs), damping),
+               std::invalid_argument);
 }
 
 TEST_F(BlockCholeskyRefuses, WhatIsNotFinite) {
