@@ -9,5 +9,6 @@ void BindGeometry(pybind11::module_& m);
 void BindGraph(pybind11::module_& m);
 void BindSolve(pybind11::module_& m);
 void BindCovariance(pybind11::module_& m);
+void BindOnline(pybind11::module_& m);
 
 }  // namespace dqslam

@@ -14,4 +14,5 @@ PYBIND11_MODULE(_core, m) {
   dqslam::BindGraph(m);
   dqslam::BindSolve(m);
   dqslam::BindCovariance(m);
+  dqslam::BindOnline(m);
 }

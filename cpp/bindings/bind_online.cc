@@ -1,0 +1,167 @@
+#include <pybind11/eigen.h>
+#include <pybind11/stl.h>
+
+#include "bindings.h"
+#include "dqslam/online/session.h"
+
+namespace py = pybind11;
+using namespace pybind11::literals;
+
+namespace dqslam {
+namespace {
+
+using online::NewSights;
+using online::OnlineOptions;
+using online::Session;
+using online::StepReport;
+
+void BindOptions(py::module_& m) {
+  py::class_<OnlineOptions>(m, "OnlineOptions", "What a caller of a session may choose.")
+      .def(py::init([](const py::kwargs& values) {
+             py::object options = py::cast(OnlineOptions());
+             for (const auto& [name, value] : values) py::setattr(options, name, value);
+             return options.cast<OnlineOptions>();
+           }),
+           "Any of the attributes as keywords.")
+      .def_readwrite("window_poses", &OnlineOptions::window_poses, "Minimised at every step.")
+      .def_readwrite("window_iterations",
+                     &OnlineOptions::window_iterations,
+                     "Levenberg-Marquardt steps of the window.")
+      .def_readwrite("recent_poses", &OnlineOptions::recent_poses, "Minimised now and then,")
+      .def_readwrite("recent_every", &OnlineOptions::recent_every, "each so many steps.")
+      .def_readwrite("lap_poses", &OnlineOptions::lap_poses, "Minimised rarely,")
+      .def_readwrite("lap_every", &OnlineOptions::lap_every, "each so many steps.")
+      .def_readwrite("smoothing_iterations",
+                     &OnlineOptions::smoothing_iterations,
+                     "Levenberg-Marquardt steps of these two.")
+      .def_readwrite("loop_absence",
+                     &OnlineOptions::loop_absence,
+                     "Poses without a sight before an object closes a loop.")
+      .def_readwrite("loop_chi_square",
+                     &OnlineOptions::loop_chi_square,
+                     "Of the window, per residual: the loop does not fit.")
+      .def_readwrite("loop_iterations",
+                     &OnlineOptions::loop_iterations,
+                     "Levenberg-Marquardt steps over a loop.")
+      .def_readwrite("loss_scale",
+                     &OnlineOptions::loss_scale,
+                     "Of a Cauchy loss on boxes, sigmas of a box; 0: least squares.");
+}
+
+void BindReport(py::module_& m) {
+  py::class_<StepReport>(m, "StepReport", "What a step cost.")
+      .def_readonly("pose", &StepReport::pose, "Row of the new pose.")
+      .def_readonly("window_poses", &StepReport::window_poses, "Poses of the window.")
+      .def_readonly("window_objects", &StepReport::window_objects, "Objects that it saw.")
+      .def_readonly("linearized",
+                    &StepReport::linearized,
+                    "Sights, in the window and to keep what lies before it.")
+      .def_readonly("undefined",
+                    &StepReport::undefined,
+                    "Sights left out of the window: their objects are not in front.")
+      .def_readonly("smoothed_poses",
+                    &StepReport::smoothed_poses,
+                    "Poses minimised beside the window; 0 at most steps.")
+      .def_readonly("smoothed_sights", &StepReport::smoothed_sights, "Sights linearised there.")
+      .def_readonly("closed_loop", &StepReport::closed_loop);
+}
+
+void BindSession(py::module_& m) {
+  py::class_<Session>(m, "Session", "Estimation step by step.")
+      .def(py::init(&Session::Make),
+           "pose_model"_a,
+           "camera"_a,
+           "scene_priors"_a = ScenePriors(),
+           "options"_a = OnlineOptions())
+      .def(
+          "add",
+          [](Session& session,
+             const Eigen::VectorXd& relative,
+             const RowMatrix& covariance,
+             const IndexVector& object,
+             const RowMatrix& box,
+             const RowMatrix& box_covariance,
+             const BoolTable& truncated,
+             const IndexVector& position_object,
+             const RowMatrix& position,
+             const RowMatrix& position_covariance,
+             const Eigen::VectorXd& log_size_mean,
+             const Eigen::VectorXd& log_size_sigma) {
+            const py::gil_scoped_release no_gil;
+            return session.Add(relative,
+                               covariance,
+                               NewSights{object,
+                                         box,
+                                         box_covariance,
+                                         truncated,
+                                         position_object,
+                                         position,
+                                         position_covariance,
+                                         log_size_mean,
+                                         log_size_sigma});
+          },
+          "relative"_a,
+          "covariance"_a,
+          "object"_a,
+          "box"_a,
+          "box_covariance"_a,
+          "truncated"_a,
+          "position_object"_a,
+          "position"_a,
+          "position_covariance"_a,
+          "log_size_mean"_a,
+          "log_size_sigma"_a,
+          "Add a pose and what it saw: covariance (k, k), boxes (n, 4) with covariances (n, 16), "
+          "positions (p, 3) with covariances (p, 9), size priors of the new objects. The first "
+          "pose's relative is the pose itself, exact if its covariance is empty.")
+      .def("add_map_object",
+           [](Session& session,
+              const Vector9d& ellipsoid,
+              const online::Matrix9d& covariance,
+              double log_size_mean,
+              double log_size_sigma) {
+             session.AddMapObject(ellipsoid, covariance, {log_size_mean, log_size_sigma});
+           },
+           "ellipsoid"_a,
+           "covariance"_a,
+           "log_size_mean"_a,
+           "log_size_sigma"_a,
+           "Add an object of a known map, and the covariance of its parameters, (9, 9).")
+      .def(
+          "smooth",
+          [](Session& session, int iterations) {
+            const py::gil_scoped_release no_gil;
+            return session.Smooth(iterations).cost;
+          },
+          "iterations"_a,
+          "Minimise all poses, the map's priors included; returns the cost.")
+      .def("merge",
+           &Session::Merge,
+           "poses"_a,
+           "ellipsoids"_a,
+           "Take over an estimate of the first poses and objects; later ones move with them.")
+      .def(
+          "to_graph",
+          [](const Session& session) {
+            std::vector<int> rows;
+            Graph graph = session.ToGraph(&rows);
+            return py::make_tuple(std::move(graph), rows);
+          },
+          "The problem so far, and the row of each of its objects.")
+      .def_property_readonly("num_poses", &Session::num_poses)
+      .def_property_readonly("num_objects", &Session::num_objects)
+      .def("pose_at", &Session::PoseAt, "row"_a, "Shape (d,).")
+      .def_property_readonly("poses", &Session::Poses, "Shape (n, d).")
+      .def_property_readonly("ellipsoids", &Session::Ellipsoids, "Shape (o, 9).")
+      .def_property_readonly("observations", &Session::Observations, "Boxes per object, (o,).");
+}
+
+}  // namespace
+
+void BindOnline(py::module_& m) {
+  BindOptions(m);
+  BindReport(m);
+  BindSession(m);
+}
+
+}  // namespace dqslam

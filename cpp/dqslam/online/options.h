@@ -1,0 +1,20 @@
+// What a caller of a session may choose.  Every default lives here and nowhere else.
+#pragma once
+
+namespace dqslam::online {
+
+struct OnlineOptions {
+  int window_poses = 10;           ///< minimised at every step
+  int window_iterations = 1;       ///< Levenberg-Marquardt steps of the window
+  int recent_poses = 64;           ///< minimised now and then,
+  int recent_every = 16;           ///< each so many steps
+  int lap_poses = 640;             ///< minimised rarely,
+  int lap_every = 128;             ///< each so many steps, while there are as many
+  int smoothing_iterations = 3;    ///< Levenberg-Marquardt steps of these two
+  int loop_absence = 128;          ///< poses without a sight before an object closes a loop
+  double loop_chi_square = 2.0;    ///< of the window, per residual: the loop does not fit
+  int loop_iterations = 10;        ///< Levenberg-Marquardt steps over a loop
+  double loss_scale = 0.0;         ///< of a Cauchy loss on boxes, sigmas of a box; 0: least squares
+};
+
+}  // namespace dqslam::online

@@ -1,0 +1,80 @@
+// Estimation step by step: bounded work at each, an estimate at any time.
+//
+// At a step the last poses and the objects they saw are minimised, poses before them constant and
+// the sights from there kept as Gaussians on the objects.  Now and then more poses are, so that
+// nothing stays frozen where it was first put; an object that comes back after an absence, and does
+// not fit, frees all poses since it was seen last.
+#pragma once
+
+#include <memory>
+
+#include "dqslam/graph.h"
+#include "dqslam/online/options.h"
+#include "dqslam/online/region.h"
+
+namespace dqslam::online {
+
+/// What one pose saw.  Objects are rows; those from the number of objects on are new, in order.
+struct NewSights {
+  IndexVector object;
+  RowMatrix box;         ///< (n, 4) undistorted pixels
+  RowMatrix covariance;  ///< (n, 16) pixels^2
+  BoolTable truncated;   ///< (n, 4)
+  IndexVector position_object;
+  RowMatrix position;             ///< (p, 3) object_in_robot, metres
+  RowMatrix position_covariance;  ///< (p, 9) metres^2
+  Eigen::VectorXd log_size_mean;  ///< of the new objects
+  Eigen::VectorXd log_size_sigma;
+};
+
+/// What a step cost.
+struct StepReport {
+  int pose = 0;             ///< row of the new pose
+  int window_poses = 0;     ///< poses of the window
+  int window_objects = 0;   ///< objects that it saw
+  int linearized = 0;       ///< sights, in the window and to keep what lies before it
+  int undefined = 0;        ///< sights left out of the window: their objects are not in front
+  int smoothed_poses = 0;   ///< poses minimised beside the window; 0 at most steps
+  int smoothed_sights = 0;  ///< sights linearised there
+  bool closed_loop = false;
+};
+
+class Session {
+ public:
+  static std::unique_ptr<Session> Make(PoseModel pose_model,
+                                       const Camera& camera,
+                                       const ScenePriors& scene,
+                                       const OnlineOptions& options);
+  virtual ~Session() = default;
+
+  /// Adds a pose and what it saw.  The first one's `relative` is the pose itself, known exactly
+  /// where its covariance is empty.  Throws std::invalid_argument, and then nothing has changed.
+  virtual StepReport Add(const Eigen::VectorXd& relative,
+                         const RowMatrix& covariance,
+                         const NewSights& sights) = 0;
+
+  /// An object of a map that is known: log-Cholesky parameters and their covariance (9, 9).
+  virtual void AddMapObject(const Vector9d& ellipsoid,
+                            const Matrix9d& covariance,
+                            const SizePrior& size) = 0;
+
+  /// Levenberg-Marquardt on all poses, priors of the map included.
+  virtual Work Smooth(int iterations) = 0;
+
+  /// Takes over what was estimated elsewhere of the first poses and objects.  Later ones move
+  /// rigidly with the last of these poses.
+  virtual void Merge(const RowMatrix& poses, const RowMatrix& ellipsoids) = 0;
+
+  /// All of it as a problem for Solve(): objects without a sight take no part, and keep their row
+  /// in `rows`.
+  virtual Graph ToGraph(std::vector<int>* rows) const = 0;
+
+  virtual int num_poses() const = 0;
+  virtual int num_objects() const = 0;
+  virtual Eigen::VectorXd PoseAt(int row) const = 0;
+  virtual RowMatrix Poses() const = 0;       ///< (poses, d)
+  virtual RowMatrix Ellipsoids() const = 0;  ///< (objects, 9) log-Cholesky parameters
+  virtual IndexVector Observations() const = 0;  ///< boxes of each object
+};
+
+}  // namespace dqslam::online

@@ -1,0 +1,24 @@
+// Where an object starts, and how it settles while the poses are held fixed.
+#pragma once
+
+#include "dqslam/online/linearize.h"
+
+namespace dqslam::online {
+
+/// Its cost and place after a few Levenberg-Marquardt steps over all its sights.
+template <typename Pose>
+double Settle(const Model& model,
+              const History<Pose>& history,
+              const Object& object,
+              int iterations,
+              Vector9d* chart);
+
+/// From the first sight: at the depth that the prior size implies, or where it was measured.
+template <typename Pose>
+Vector9d Birth(const Model& model, const History<Pose>& history, const Object& object);
+
+/// Starts an object again from all its boxes, and keeps what fits them better.
+template <typename Pose>
+void TryAgain(const Model& model, const History<Pose>& history, Object* object);
+
+}  // namespace dqslam::online
