@@ -2,6 +2,7 @@
 #include <pybind11/stl.h>
 
 #include "bindings.h"
+#include "dqslam/online/relocalise.h"
 #include "dqslam/online/session.h"
 
 namespace py = pybind11;
@@ -43,6 +44,12 @@ void BindOptions(py::module_& m) {
       .def_readwrite("loop_iterations",
                      &OnlineOptions::loop_iterations,
                      "Levenberg-Marquardt steps over a loop.")
+      .def_readwrite("misfit_chi_square",
+                     &OnlineOptions::misfit_chi_square,
+                     "Of the window, per residual: its objects start again.")
+      .def_readwrite("recover_every",
+                     &OnlineOptions::recover_every,
+                     "Steps between two such starts, at least.")
       .def_readwrite("loss_scale",
                      &OnlineOptions::loss_scale,
                      "Of a Cauchy loss on boxes, sigmas of a box; 0: least squares.");
@@ -58,12 +65,16 @@ void BindReport(py::module_& m) {
                     "Sights, in the window and to keep what lies before it.")
       .def_readonly("undefined",
                     &StepReport::undefined,
-                    "Sights left out of the window: their objects are not in front.")
+                    "Sights of the window whose objects are not in front.")
+      .def_readonly("chi_square",
+                    &StepReport::chi_square,
+                    "Of the window, per residual: 1 where the model is right.")
       .def_readonly("smoothed_poses",
                     &StepReport::smoothed_poses,
                     "Poses minimised beside the window; 0 at most steps.")
       .def_readonly("smoothed_sights", &StepReport::smoothed_sights, "Sights linearised there.")
-      .def_readonly("closed_loop", &StepReport::closed_loop);
+      .def_readonly("closed_loop", &StepReport::closed_loop)
+      .def_readonly("recovered", &StepReport::recovered, "Young objects were started again.");
 }
 
 void BindSession(py::module_& m) {
@@ -148,6 +159,7 @@ void BindSession(py::module_& m) {
             return py::make_tuple(std::move(graph), rows);
           },
           "The problem so far, and the row of each of its objects.")
+      .def("clone", &Session::Clone, "A copy that goes its own way.")
       .def_property_readonly("num_poses", &Session::num_poses)
       .def_property_readonly("num_objects", &Session::num_objects)
       .def("pose_at", &Session::PoseAt, "row"_a, "Shape (d,).")
@@ -156,9 +168,53 @@ void BindSession(py::module_& m) {
       .def_property_readonly("observations", &Session::Observations, "Boxes per object, (o,).");
 }
 
+void BindRelocalise(py::module_& m) {
+  using online::Relocation;
+  py::class_<Relocation>(m, "Relocation", "Where the robot is in a map, and where else it may be.")
+      .def_readonly("pose", &Relocation::pose, "world_from_robot, shape (d,).")
+      .def_readonly("covariance", &Relocation::covariance, "In the pose's tangent, shape (k, k).")
+      .def_readonly("object", &Relocation::object, "Row of the object of each box, -1: none.")
+      .def_readonly("chi_square", &Relocation::chi_square, "Of the boxes that have an object.")
+      .def_readonly("matches", &Relocation::matches, "Boxes that have an object.")
+      .def_readonly("runner_up",
+                    &Relocation::runner_up,
+                    "Chi-square of the best other place with as many matches; infinite: none.")
+      .def_readonly("other", &Relocation::other, "That place, shape (d,).");
+  m.def(
+      "relocalise",
+      [](PoseModel pose_model,
+         const Camera& camera,
+         const RowMatrix& ellipsoids,
+         const RowMatrix& covariance,
+         const RowMatrix& box,
+         const RowMatrix& box_covariance,
+         const BoolTable& truncated,
+         const std::vector<std::vector<int>>& candidates,
+         int fewest) {
+        const py::gil_scoped_release no_gil;
+        return online::Relocalise(
+            pose_model,
+            camera,
+            {ellipsoids, covariance, box, box_covariance, truncated, candidates},
+            fewest);
+      },
+      "pose_model"_a,
+      "camera"_a,
+      "ellipsoids"_a,
+      "covariance"_a,
+      "box"_a,
+      "box_covariance"_a,
+      "truncated"_a,
+      "candidates"_a,
+      "fewest"_a,
+      "Find the pose from boxes (b, 4) of objects (o, 9), with covariances (o, 81) and (b, 16); the "
+      "candidates of a box are rows of objects that it may show. ValueError where there is none.");
+}
+
 }  // namespace
 
 void BindOnline(py::module_& m) {
+  BindRelocalise(m);
   BindOptions(m);
   BindReport(m);
   BindSession(m);

@@ -47,38 +47,106 @@ void BoxError(const Camera& camera,
   }
 }
 
+// Derivatives of focal (a n.dp + b n^T dS n), the camera's frame, for the edge of axis and normal n.
+template <typename Pose>
+void SetEdge(const Stand& stand,
+             const Surface<double>& object,
+             const Vector3d& q,
+             int edge,
+             const Vector3d& n,
+             double a,
+             double b,
+             Linear<Pose>* linear) {
+  const Eigen::Matrix3d& R = stand.world_from_robot.rotation;
+  const Vector3d w = stand.camera.camera_from_world.transpose() * n;
+  const Vector3d in_robot = R.transpose() * w;
+  const Vector3d v = R.transpose() * (object.shape * w);
+  SetTangent<Pose>(
+      -a * in_robot, -(a * q + 2 * b * v).cross(in_robot), linear->by_pose.row(edge));
+  linear->by_object.row(edge) << a * w.transpose(), b * w[0] * w[0], 2 * b * w[0] * w[1],
+      2 * b * w[0] * w[2], b * w[1] * w[1], 2 * b * w[1] * w[2], b * w[2] * w[2];
+}
+
+struct Edge {
+  int axis;
+  double outward, focal, principal;
+  Edge(const Camera& camera, int edge)
+      : axis(edge % 2),
+        outward(edge < 2 ? -1 : 1),
+        focal(axis == 0 ? camera.fx : camera.fy),
+        principal(axis == 0 ? camera.cx : camera.cy) {}
+  Vector3d Normal(double pixel) const {
+    Vector3d n = Vector3d::Zero();
+    n[axis] = 1;
+    n.z() = -(pixel - principal) / focal;
+    return n;
+  }
+};
+
+// The depth that turns metres into pixels, as in assembly.cc.
+double TangentDepth(const Surface<double>& in_camera) {
+  const double thickness = std::sqrt(std::max(in_camera.shape(2, 2), 1e-12));
+  return std::max(in_camera.center.z(), 1.5 * thickness);
+}
+
+// Error by edge; false where it is undefined.
+bool BoxOrTangentError(const Camera& camera,
+                       const Sight& sight,
+                       const Surface<double>& in_camera,
+                       double depth,
+                       Vector4d* predicted,
+                       Vector4d* error) {
+  if (depth == 0) {
+    if (!ProjectToBox(in_camera, camera, predicted)) return false;
+    BoxError(camera, sight, in_camera, *predicted, error);
+    return true;
+  }
+  if (!TangentDistances(in_camera, camera, sight.value, depth, error)) return false;
+  // Distances point outwards.
+  for (int edge = 0; edge < kBoxSize; ++edge) {
+    if (sight.truncated[edge] && (*error)[edge] > 0) (*error)[edge] = 0;
+  }
+  return true;
+}
+
 template <typename Pose>
 void LinearizeBox(const Model& model,
                   const Stand& stand,
+                  const Sight& sight,
                   const Surface<double>& object,
-                  const Surface<double>& in_camera,
-                  const Vector4d& predicted,
+                  Edges edges,
+                  Vector4d* error,
                   Linear<Pose>* linear) {
   const Camera& camera = model.camera;
-  const Eigen::Matrix3d& R = stand.world_from_robot.rotation;
+  const Surface<double> in_camera = ToCamera(stand.camera, object);
   const Vector3d& p = in_camera.center;
   const Eigen::Matrix3d& S = in_camera.shape;
-  const Vector3d q = R.transpose() * (object.center - stand.world_from_robot.translation);
-  const double focal[2] = {camera.fx, camera.fy}, principal[2] = {camera.cx, camera.cy};
-  for (int edge = 0; edge < kBoxSize; ++edge) {
-    const int axis = edge % 2;
-    const double x = (predicted[edge] - principal[axis]) / focal[axis];
-    const double e = (S(2, 2) - p.z() * p.z()) * x - (S(axis, 2) - p[axis] * p.z());
-    Vector3d n = Vector3d::Zero();
-    n[axis] = 1;
-    n.z() = -x;
-    const double a = n.dot(p), scale = focal[axis] / e;
-    const Vector3d in_world = stand.camera.camera_from_world.transpose() * n;
-    const Vector3d in_robot = R.transpose() * in_world;
-    const Vector3d v = R.transpose() * (object.shape * in_world);
-    SetTangent<Pose>(-scale * a * in_robot,
-                     scale * (v - a * q).cross(in_robot),
-                     linear->by_pose.row(edge));
-    const double half = -0.5 * scale;
-    linear->by_object.row(edge) << scale * a * in_world.transpose(),
-        half * in_world[0] * in_world[0], 2 * half * in_world[0] * in_world[1],
-        2 * half * in_world[0] * in_world[2], half * in_world[1] * in_world[1],
-        2 * half * in_world[1] * in_world[2], half * in_world[2] * in_world[2];
+  const Rigid<double>& robot = stand.world_from_robot;
+  const Vector3d q = robot.rotation.transpose() * (object.center - robot.translation);
+  Vector4d predicted;
+  linear->depth = 0;
+  if (edges == Edges::kTangent ||
+      !BoxOrTangentError(camera, sight, in_camera, 0, &predicted, error)) {
+    linear->depth = TangentDepth(in_camera);
+    BoxOrTangentError(camera, sight, in_camera, linear->depth, &predicted, error);
+  }
+  for (int row = 0; row < kBoxSize; ++row) {
+    const Edge edge(camera, row);
+    double a, b;
+    Vector3d n;
+    if (linear->depth == 0) {
+      n = edge.Normal(predicted[row]);
+      const double x = -n.z();
+      const double e = (S(2, 2) - p.z() * p.z()) * x - (S(edge.axis, 2) - p[edge.axis] * p.z());
+      a = edge.focal * n.dot(p) / e;
+      b = -0.5 * edge.focal / e;
+    } else {
+      n = edge.Normal(sight.value[row]);
+      a = edge.focal / linear->depth * edge.outward;
+      b = edge.focal / linear->depth * 0.5 / std::sqrt(std::max(n.dot(S * n), 1e-18));
+    }
+    if (sight.truncated.any() && (*error)[row] == 0) a = b = 0;  // ignored, or without effect
+    SetEdge<Pose>(stand, object, q, row, n, a, b, linear);
   }
 }
 
@@ -98,53 +166,49 @@ void LinearizePosition(const Stand& stand, const Surface<double>& object, Linear
 
 }  // namespace
 
-bool ErrorOf(const Model& model,
-             const Stand& stand,
-             const Sight& sight,
-             const Vector9d& chart,
-             Vector4d* whitened,
-             double* cost,
-             double* loss) {
+double CostOfSight(const Model& model,
+                   const Stand& stand,
+                   const Sight& sight,
+                   const Vector9d& chart,
+                   double depth,
+                   double* chi_square) {
   const Surface<double> object = SurfaceOf(chart);
-  Vector4d error = Vector4d::Zero();
-  if (sight.is_box) {
-    const Surface<double> in_camera = ToCamera(stand.camera, object);
-    Vector4d predicted;
-    if (!ProjectToBox(in_camera, model.camera, &predicted)) return false;
-    BoxError(model.camera, sight, in_camera, predicted, &error);
-  } else {
+  Vector4d error = Vector4d::Zero(), predicted;
+  *chi_square = std::numeric_limits<double>::infinity();
+  if (!sight.is_box) {
     const Rigid<double>& robot = stand.world_from_robot;
     error.head<3>() = sight.value.head<3>() -
                       robot.rotation.transpose() * (object.center - robot.translation);
+  } else if (!BoxOrTangentError(model.camera,
+                                sight,
+                                ToCamera(stand.camera, object),
+                                depth,
+                                &predicted,
+                                &error)) {
+    return *chi_square;
   }
-  *whitened = sight.sqrt_information * error;
-  Weigh(sight.is_box ? model.loss_scale : 0, whitened->squaredNorm(), cost, loss);
-  return std::isfinite(*cost);
+  *chi_square = (sight.sqrt_information * error).squaredNorm();
+  double cost, loss;
+  Weigh(sight.is_box ? model.loss_scale : 0, *chi_square, &cost, &loss);
+  return cost;
 }
 
 template <typename Pose>
-bool Linearize(const Model& model,
+void Linearize(const Model& model,
                const Stand& stand,
                const Sight& sight,
                const Vector9d& chart,
+               Edges edges,
                Linear<Pose>* linear) {
   const Surface<double> object = SurfaceOf(chart);
   Vector4d error = Vector4d::Zero();
   if (sight.is_box) {
-    const Surface<double> in_camera = ToCamera(stand.camera, object);
-    Vector4d predicted;
-    if (!ProjectToBox(in_camera, model.camera, &predicted)) return false;
-    BoxError(model.camera, sight, in_camera, predicted, &error);
-    LinearizeBox<Pose>(model, stand, object, in_camera, predicted, linear);
-    for (int edge = 0; sight.truncated.any() && edge < kBoxSize; ++edge) {
-      if (error[edge] != 0) continue;  // ignored, or without effect
-      linear->by_pose.row(edge).setZero();
-      linear->by_object.row(edge).setZero();
-    }
+    LinearizeBox<Pose>(model, stand, sight, object, edges, &error, linear);
   } else {
     const Rigid<double>& robot = stand.world_from_robot;
     error.head<3>() = sight.value.head<3>() -
                       robot.rotation.transpose() * (object.center - robot.translation);
+    linear->depth = 0;
     LinearizePosition<Pose>(stand, object, linear);
   }
   const Eigen::Matrix4d& W = sight.sqrt_information;
@@ -155,7 +219,6 @@ bool Linearize(const Model& model,
   const Eigen::Matrix4d weight = loss * W;
   linear->by_pose = weight * linear->by_pose.eval();
   linear->by_object = weight * linear->by_object.eval();
-  return std::isfinite(linear->cost);
 }
 
 template <typename Pose>
@@ -262,8 +325,8 @@ double LinearizeHeight(const Model& model,
 }
 
 #define DQSLAM_INSTANTIATE(Pose)                                                            \
-  template bool Linearize<Pose>(                                                            \
-      const Model&, const Stand&, const Sight&, const Vector9d&, Linear<Pose>*);            \
+  template void Linearize<Pose>(                                                            \
+      const Model&, const Stand&, const Sight&, const Vector9d&, Edges, Linear<Pose>*);            \
   template LinearStep<Pose> LinearizeStep<Pose>(                                            \
       const History<Pose>::Step&, const double*, const double*);                            \
   template double CostOfStep<Pose>(const History<Pose>::Step&, const double*, const double*); \

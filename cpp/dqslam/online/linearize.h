@@ -4,8 +4,10 @@
 // n.S n = (n.p)^2, p and S in the camera frame.  Differentiated:
 //   dx = ((n.p) n.dp - n.dS n / 2) / e,   e = D x - B = +-sqrt(B^2 - A D)  (see ProjectToBox)
 // With v = S n, all in the robot frame, and q the centre there:
-//   by the centre (n.p) n / e;  by S  -n n^T / (2 e);  by the pose's translation -(n.p) n / e, and
-//   by its rotation (v x n - (n.p) q x n) / e.
+//   by the centre a n;  by S  b n n^T;  by the pose's translation  -a n;  by its rotation
+//   -a q x n - 2 b v x n;  with a = (n.p) / e and b = -1 / (2 e).
+// Where the object is not strictly in front, the tangent residual takes the place of the box's, see
+// costs/tangent.h: n.p + |L^T n| with the n of the observed edge, hence a = +-1, b = 1 / (2 |L^T n|).
 #pragma once
 
 #include <ceres/jet.h>
@@ -44,7 +46,8 @@ struct Linear {
   Eigen::Vector4d residual;
   Eigen::Matrix<double, 4, Pose::kTangentSize> by_pose;
   Eigen::Matrix<double, 4, 9> by_object;
-  double cost;  ///< after the loss, which scales the rest
+  double cost;   ///< after the loss, which scales the rest
+  double depth;  ///< of the tangent residual [m], 0 where it is the box's
 };
 
 /// Takes the components of a tangent of SE(3) that the pose model has.
@@ -57,21 +60,25 @@ void SetTangent(const Eigen::Vector3d& translation, const Eigen::Vector3d& rotat
   }
 }
 
-/// Error of a sight; false where the object is not strictly in front.  `loss` is rho'(s)^(1/2).
-bool ErrorOf(const Model& model,
-             const Stand& stand,
-             const Sight& sight,
-             const Vector9d& chart,
-             Eigen::Vector4d* whitened,
-             double* cost,
-             double* loss);
+/// Cost of a sight after the loss, and its chi-square before; with the residual that Linearize()
+/// used, of that depth.  Infinite where it is the box's and the object is not strictly in front.
+double CostOfSight(const Model& model,
+                   const Stand& stand,
+                   const Sight& sight,
+                   const Vector9d& chart,
+                   double depth,
+                   double* chi_square);
 
-/// The same with derivatives.
+/// Which residual a box has where its object is in front; elsewhere it is the tangent's.
+enum class Edges { kBox, kTangent };
+
+/// The residual with derivatives.
 template <typename Pose>
-bool Linearize(const Model& model,
+void Linearize(const Model& model,
                const Stand& stand,
                const Sight& sight,
                const Vector9d& chart,
+               Edges edges,
                Linear<Pose>* linear);
 
 /// Residual and derivatives by the tangents of both poses, (k, 2 k).

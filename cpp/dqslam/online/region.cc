@@ -7,6 +7,10 @@ namespace dqslam::online {
 namespace {
 
 constexpr double kLeastDamping = 1e-9, kMostDamping = 1e3;
+constexpr double kTolerance = 1e-4;
+// Mean chi-square of an object's sights, 4 where all is well, from which on it is in a wrong place.
+constexpr double kMisfit = 4 * 4;
+constexpr int kFewestSights = 3;
 
 // The pose of no motion: where the prior of a first pose starts from.
 template <typename Pose>
@@ -40,7 +44,7 @@ void AddPast(const Model& model,
   for (int i = first; i < last; ++i) {
     const Sight& sight = history.sights[object.sights[i]];
     const Stand stand = StandAt<Pose>(model, history.poses[sight.pose].data());
-    if (!Linearize<Pose>(model, stand, sight, object.chart, &linear)) continue;
+    Linearize<Pose>(model, stand, sight, object.chart, Edges::kBox, &linear);
     const Matrix9d H = linear.by_object.transpose() * linear.by_object;
     past->H += H;
     past->g += linear.by_object.transpose() * linear.residual - H * d;
@@ -49,8 +53,9 @@ void AddPast(const Model& model,
 
 template <typename Pose>
 Work Region<Pose>::Minimize(
-    History<Pose>* history, int begin, Past past, int iterations, double* damping) {
+    History<Pose>* history, int begin, Past past, int iterations, double* damping, Edges edges) {
   Work work;
+  edges_ = edges;
   identity_ = Identity<Pose>();
   begin_ = std::max(begin, history->first_pose_is_known ? 1 : 0);
   end_ = history->num_poses();
@@ -71,9 +76,13 @@ Work Region<Pose>::Minimize(
     *damping = std::max(*damping / 5, kLeastDamping);
     work.cost = after;
     work.moved = true;
-    if (before - after < 1e-9 * std::abs(before)) break;
+    if (before - after < kTolerance * std::abs(before)) break;
   }
-  for (const Local& local : locals_) local_of_object_[local.object] = -1;
+  for (const Local& local : locals_) {
+    local_of_object_[local.object] = -1;
+    const bool misfit = local.sights >= kFewestSights && local.chi_square > kMisfit * local.sights;
+    if (misfit) work.misfits.push_back(local.object);
+  }
   return work;
 }
 
@@ -88,11 +97,11 @@ void Region<Pose>::Collect(History<Pose>* history, int begin, Past past, Work* w
     int& local = local_of_object_[sight.object];
     if (local < 0) {
       local = static_cast<int>(locals_.size());
-      locals_.push_back({sight.object, sight.pose, -1, nullptr, Vector9d::Zero()});
+      locals_.push_back({sight.object, sight.pose, -1, nullptr, Vector9d::Zero(), 0, 0});
     }
     locals_[local].last_pose = sight.pose;
   }
-  defined_.assign(last - first, true);
+  depth_.assign(last - first, 0);
   anew_.clear();
   anew_.reserve(locals_.size());  // no growth: pointers into it
   for (Local& local : locals_) {
@@ -162,12 +171,9 @@ double Region<Pose>::LinearizePose(const History<Pose>& history, int pose, Work*
       chain_.AddObjectInformation(local.slot, sum.H, sum.g);
     }
     ++work->linearized;
-    const bool defined = Linearize<Pose>(model_, stand, sight, object.chart, &linear);
-    defined_[row - first] = defined;
-    if (!defined) {
-      ++work->undefined;
-      continue;
-    }
+    Linearize<Pose>(model_, stand, sight, object.chart, edges_, &linear);
+    depth_[row - first] = linear.depth;
+    work->undefined += linear.depth > 0;
     cost += linear.cost;
     chain_.AddSight(local.slot, linear.residual, linear.by_pose, linear.by_object);
   }
@@ -215,9 +221,10 @@ const double* Region<Pose>::TrialPose(const History<Pose>& history, int pose) co
 }
 
 template <typename Pose>
-double Region<Pose>::TrialCost(const History<Pose>& history, Work* work) const {
+double Region<Pose>::TrialCost(const History<Pose>& history, Work* work) {
   double cost = 0;
-  for (const Local& local : locals_) {
+  for (Local& local : locals_) {
+    local.chi_square = local.sights = 0;
     const Object& object = history.objects[local.object];
     cost += CostOf(*local.past, local.trial) + CostOfPriors(model_, object, local.trial);
   }
@@ -234,20 +241,14 @@ double Region<Pose>::TrialCost(const History<Pose>& history, Work* work) const {
     }
     const Stand stand = StandAt<Pose>(model_, at);
     for (int row = history.SightsBefore(pose); row < history.SightsBefore(pose + 1); ++row) {
-      if (!defined_[row - first]) continue;
       const Sight& sight = history.sights[row];
-      Eigen::Vector4d error;
-      double sight_cost, loss;
-      if (!ErrorOf(model_,
-                   stand,
-                   sight,
-                   locals_[local_of_object_[sight.object]].trial,
-                   &error,
-                   &sight_cost,
-                   &loss)) {
-        return std::numeric_limits<double>::infinity();
-      }
-      measured += sight_cost;
+      Local& local = locals_[local_of_object_[sight.object]];
+      double chi_square;
+      measured +=
+          CostOfSight(model_, stand, sight, local.trial, depth_[row - first], &chi_square);
+      if (!std::isfinite(chi_square)) return chi_square;
+      local.chi_square += chi_square;
+      ++local.sights;
       residuals += sight.is_box ? 4 : 3;
     }
   }

@@ -12,8 +12,14 @@ namespace dqslam::online {
 namespace {
 
 constexpr double kFirstDamping = 1e-4;
-// An object is started again when it has so many sights: two tell a distance, more a shape.
-constexpr int kTryAgainAt[] = {2, 4, 8, 16, 32};
+constexpr double kMostDamping = 1e-2;  // that a window takes over from the one before
+constexpr int kRecoverIterations = 10;
+// What a sight costs beside its tangent residual while its object is not in front.
+constexpr double kUndefinedCost = 50;
+// A young session minimises a lap whenever it has grown by this share, after so many steps.
+constexpr int kLapGrowth = 4, kSoonestLap = 16;
+// An object is started again when it has so many sights.
+constexpr int kTryAgainAt[] = {4, 8, 16, 32};
 // What lies before the window is linearised anew when it has grown by this share.
 constexpr double kGrowth = 1.25;
 
@@ -142,6 +148,18 @@ class SessionOf : public Session {
     history_.objects.push_back(object);
   }
 
+  std::unique_ptr<Session> Clone() const override {
+    auto copy = std::make_unique<SessionOf>(model_.camera, model_.scene, options_);
+    copy->history_ = history_;
+    copy->damping_ = damping_;
+    copy->next_lap_ = next_lap_;
+    copy->next_recovery_ = next_recovery_;
+    copy->loop_begin_ = loop_begin_;
+    copy->loop_until_ = loop_until_;
+    copy->loop_credit_ = loop_credit_;
+    return copy;
+  }
+
   Work Smooth(int iterations) override {
     double damping = kFirstDamping;
     const Work work = region_.Minimize(&history_, 0, Past::kAnew, iterations, &damping);
@@ -268,24 +286,103 @@ class SessionOf : public Session {
         std::max(end - options_.window_poses, history_.first_pose_is_known ? 1 : 0);
     if (begin >= end) return report;
     report.linearized = KeepPast(begin);
+    damping_ = std::min(damping_, kMostDamping);
     const Work window =
         region_.Minimize(&history_, begin, Past::kKept, options_.window_iterations, &damping_);
     report.window_poses = window.poses;
     report.window_objects = window.objects;
     report.linearized += window.linearized;
     report.undefined = window.undefined;
+    report.chi_square = window.residuals > 0 ? window.chi_square / window.residuals : 0;
+    if (DoesNotFit(window)) Recover(&report);
     const int smooth_from = ChooseSmoothing(window, begin, &report);
     if (smooth_from < begin) {
-      double damping = kFirstDamping;
       const int iterations =
           report.closed_loop ? options_.loop_iterations : options_.smoothing_iterations;
-      const Work work =
-          region_.Minimize(&history_, smooth_from, Past::kAnew, iterations, &damping);
-      MarkStale(smooth_from);
-      report.smoothed_poses = work.poses;
-      report.smoothed_sights = work.linearized;
+      SmoothFrom(smooth_from, iterations, &report);
     }
     return report;
+  }
+
+  bool DoesNotFit(const Work& window) {
+    return num_poses() >= next_recovery_ &&
+           (window.undefined > 0 ||
+            window.chi_square > options_.misfit_chi_square * window.residuals);
+  }
+
+  // Boxes reject most places far from the right one, so that a window cannot leave a wrong one.
+  // The recent poses go back to their odometry and the young objects that they saw to their starts:
+  // the tangent residual leads from there to what the boxes then refine, as in Grow().
+  void Recover(StepReport* report) {
+    const int end = num_poses();
+    next_recovery_ = end + options_.recover_every;
+    const int begin =
+        std::max(end - options_.recent_poses, history_.first_pose_is_known ? 1 : 0);
+    std::vector<int> objects;
+    for (int row = history_.SightsBefore(begin); row < static_cast<int>(history_.sights.size());
+         ++row) {
+      const int object = history_.sights[row].object;
+      const bool is_young =
+          history_.objects[object].sights.front() >= history_.SightsBefore(begin);
+      if (is_young && history_.objects[object].map.H.isZero(0) &&
+          std::find(objects.begin(), objects.end(), object) == objects.end()) {
+        objects.push_back(object);
+      }
+    }
+    double damping = kFirstDamping;
+    double best = Cost(region_.Minimize(
+        &history_, begin, Past::kAnew, options_.smoothing_iterations, &damping));
+    for (const bool by_size : {false, true}) {
+      const std::vector<Storage> poses(history_.poses.begin() + begin, history_.poses.end());
+      std::vector<Vector9d> charts;
+      for (const Object& object : history_.objects) charts.push_back(object.chart);
+      for (int pose = std::max(begin, 1); pose < end; ++pose) {
+        Pose::Compose(history_.poses[pose - 1].data(),
+                      history_.steps[pose].relative.data(),
+                      history_.poses[pose].data());
+      }
+      for (const int row : objects) {
+        history_.objects[row].chart =
+            StartAgain(model_, history_, history_.objects[row], by_size);
+      }
+      damping = kFirstDamping;
+      region_.Minimize(
+          &history_, begin, Past::kAnew, kRecoverIterations, &damping, Edges::kTangent);
+      const Work work =
+          region_.Minimize(&history_, begin, Past::kAnew, kRecoverIterations, &damping);
+      report->smoothed_sights += work.linearized;
+      if (Cost(work) < best) {
+        best = Cost(work);
+        continue;
+      }
+      std::copy(poses.begin(), poses.end(), history_.poses.begin() + begin);
+      for (int row = 0; row < num_objects(); ++row) history_.objects[row].chart = charts[row];
+    }
+    MarkStale(begin);
+    report->recovered = true;
+    report->smoothed_poses = end - begin;
+  }
+
+  static double Cost(const Work& work) { return work.cost + kUndefinedCost * work.undefined; }
+
+  // Objects in a wrong place are started again, and all is minimised once more.
+  void SmoothFrom(int begin, int iterations, StepReport* report) {
+    double damping = kFirstDamping;
+    for (int round = 0; round < 2; ++round) {
+      const Work work = region_.Minimize(&history_, begin, Past::kAnew, iterations, &damping);
+      MarkStale(begin);
+      report->smoothed_poses = work.poses;
+      report->smoothed_sights += work.linearized;
+      bool changed = false;
+      for (const int row : work.misfits) {
+        Object& object = history_.objects[row];
+        if (!object.map.H.isZero(0)) continue;
+        const Vector9d before = object.chart;
+        TryAgain(model_, history_, &object);
+        changed = changed || object.chart != before;
+      }
+      if (!changed) break;
+    }
   }
 
   // The first pose to minimise beside the window's; the window's begin for none.
@@ -300,7 +397,10 @@ class SessionOf : public Session {
       report->closed_loop = true;
       return std::min(loop_begin_, begin);
     }
-    if (end % options_.lap_every == 0) return std::max(end - options_.lap_poses, 0);
+    if (end >= next_lap_) {
+      next_lap_ = end + std::clamp(end / kLapGrowth, kSoonestLap, options_.lap_every);
+      return std::max(end - options_.lap_poses, 0);
+    }
     if (end % options_.recent_every == 0) return std::max(end - options_.recent_poses, 0);
     return begin;
   }
@@ -344,6 +444,8 @@ class SessionOf : public Session {
   double damping_ = kFirstDamping;  // of the window
   int loop_begin_ = 0;              // the pose that last saw what has come back
   int loop_until_ = -1;             // until when the window is watched for it
+  int next_lap_ = kSoonestLap;
+  int next_recovery_ = 0;
   double loop_credit_ = 1;          // loops that may be closed now
 };
 

@@ -33,10 +33,12 @@ struct StepReport {
   int window_poses = 0;     ///< poses of the window
   int window_objects = 0;   ///< objects that it saw
   int linearized = 0;       ///< sights, in the window and to keep what lies before it
-  int undefined = 0;        ///< sights left out of the window: their objects are not in front
+  int undefined = 0;        ///< sights of the window whose objects are not in front
+  double chi_square = 0;    ///< of the window, per residual: 1 where the model is right
   int smoothed_poses = 0;   ///< poses minimised beside the window; 0 at most steps
   int smoothed_sights = 0;  ///< sights linearised there
   bool closed_loop = false;
+  bool recovered = false;  ///< young objects were started again
 };
 
 class Session {
@@ -46,6 +48,7 @@ class Session {
                                        const ScenePriors& scene,
                                        const OnlineOptions& options);
   virtual ~Session() = default;
+  virtual std::unique_ptr<Session> Clone() const = 0;
 
   /// Adds a pose and what it saw.  The first one's `relative` is the pose itself, known exactly
   /// where its covariance is empty.  Throws std::invalid_argument, and then nothing has changed.

@@ -1,5 +1,6 @@
 #include "dqslam/online/start.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -7,7 +8,7 @@ namespace dqslam::online {
 namespace {
 
 constexpr int kSettleIterations = 6;
-// What a sight costs that the object cannot have: more than any that fits at all.
+// What a sight costs beside its tangent residual while its object is not in front.
 constexpr double kUndefinedCost = 50;
 
 template <typename Pose>
@@ -24,35 +25,40 @@ std::vector<View> ViewsOf(const Model& model,
   return views;
 }
 
-// Cost at a chart; with `sum`, its derivatives as well.
+// Derivatives at a chart, and the residuals that were used.
+template <typename Pose>
+double LinearizeAt(const Model& model,
+                   const History<Pose>& history,
+                   const Object& object,
+                   const Vector9d& chart,
+                   Quadratic* sum,
+                   std::vector<double>* depths) {
+  double cost = AddPriors(model, object, chart, sum);
+  depths->clear();
+  Linear<Pose> linear;
+  for (const int row : object.sights) {
+    const Sight& sight = history.sights[row];
+    const Stand stand = StandAt<Pose>(model, history.poses[sight.pose].data());
+    Linearize<Pose>(model, stand, sight, chart, Edges::kBox, &linear);
+    sum->H.noalias() += linear.by_object.transpose() * linear.by_object;
+    sum->g += linear.by_object.transpose() * linear.residual;
+    cost += linear.cost;
+    depths->push_back(linear.depth);
+  }
+  return cost;
+}
+
 template <typename Pose>
 double CostAt(const Model& model,
               const History<Pose>& history,
               const Object& object,
               const Vector9d& chart,
-              Quadratic* sum) {
-  double cost =
-      sum ? AddPriors(model, object, chart, sum) : CostOfPriors(model, object, chart);
-  for (const int row : object.sights) {
-    const Sight& sight = history.sights[row];
+              const std::vector<double>& depths) {
+  double cost = CostOfPriors(model, object, chart), unused;
+  for (size_t i = 0; i < object.sights.size(); ++i) {
+    const Sight& sight = history.sights[object.sights[i]];
     const Stand stand = StandAt<Pose>(model, history.poses[sight.pose].data());
-    bool defined = false;
-    double sight_cost = kUndefinedCost;
-    if (sum) {
-      Linear<Pose> linear;
-      defined = Linearize<Pose>(model, stand, sight, chart, &linear);
-      if (defined) {
-        sum->H.noalias() += linear.by_object.transpose() * linear.by_object;
-        sum->g += linear.by_object.transpose() * linear.residual;
-        sight_cost = linear.cost;
-      }
-    } else {
-      Eigen::Vector4d error;
-      double loss, found;
-      defined = ErrorOf(model, stand, sight, chart, &error, &found, &loss);
-      if (defined) sight_cost = found;
-    }
-    cost += sight_cost;
+    cost += CostOfSight(model, stand, sight, chart, depths[i], &unused);
   }
   return cost;
 }
@@ -66,27 +72,30 @@ double Settle(const Model& model,
               int iterations,
               Vector9d* chart) {
   double damping = 1e-3, cost = std::numeric_limits<double>::infinity();
+  std::vector<double> depths;
   for (int iteration = 0; iteration < iterations; ++iteration) {
     Quadratic sum;
-    cost = CostAt(model, history, object, *chart, &sum);
+    cost = LinearizeAt(model, history, object, *chart, &sum, &depths);
     Matrix9d H = sum.H;
     H.diagonal() *= 1 + damping;
     const Vector9d step = -H.ldlt().solve(sum.g);
     Vector9d trial;
-    const double after = step.allFinite() && Move(*chart, step, &trial)
-                             ? CostAt(model, history, object, trial, nullptr)
-                             : std::numeric_limits<double>::infinity();
-    if (after < cost) {
-      const bool done = cost - after < 1e-4 * cost;
-      *chart = trial;
-      cost = after;
-      damping /= 5;
-      if (done) break;
-    } else {
+    const bool possible = step.allFinite() && Move(*chart, step, &trial);
+    const double after = possible ? CostAt(model, history, object, trial, depths) : cost;
+    if (!(after < cost)) {
       damping *= 10;
+      continue;
     }
+    const bool done = cost - after < 1e-4 * cost;
+    *chart = trial;
+    cost = after;
+    damping /= 5;
+    if (done) break;
   }
-  return cost;
+  // A place where a sight is impossible is worth little, however well the tangents fit there.
+  return cost + kUndefinedCost * std::count_if(depths.begin(), depths.end(), [](double depth) {
+           return depth > 0;
+         });
 }
 
 template <typename Pose>
@@ -103,14 +112,22 @@ Vector9d Birth(const Model& model, const History<Pose>& history, const Object& o
 }
 
 template <typename Pose>
+Vector9d StartAgain(const Model& model,
+                    const History<Pose>& history,
+                    const Object& object,
+                    bool by_size) {
+  const std::vector<View> views = ViewsOf(model, history, object);
+  if (views.empty()) return object.chart;
+  return ChartFromEllipsoid(by_size ? BackProject(model.camera, views, object.size)
+                                    : FitSphere(model.camera, views, object.size));
+}
+
+template <typename Pose>
 void TryAgain(const Model& model, const History<Pose>& history, Object* object) {
-  const std::vector<View> views = ViewsOf(model, history, *object);
-  if (views.empty()) return;
   Vector9d here = object->chart;
   double cost = Settle(model, history, *object, kSettleIterations, &here);
-  for (const Vector9d& ellipsoid : {FitSphere(model.camera, views, object->size),
-                                    BackProject(model.camera, views, object->size)}) {
-    Vector9d there = ChartFromEllipsoid(ellipsoid);
+  for (const bool by_size : {false, true}) {
+    Vector9d there = StartAgain(model, history, *object, by_size);
     const double other = Settle(model, history, *object, kSettleIterations, &there);
     if (!(other < cost)) continue;
     cost = other;
@@ -123,6 +140,8 @@ void TryAgain(const Model& model, const History<Pose>& history, Object* object) 
   template double Settle<Pose>(                                                              \
       const Model&, const History<Pose>&, const Object&, int, Vector9d*);                    \
   template Vector9d Birth<Pose>(const Model&, const History<Pose>&, const Object&);          \
+  template Vector9d StartAgain<Pose>(                                                        \
+      const Model&, const History<Pose>&, const Object&, bool);                              \
   template void TryAgain<Pose>(const Model&, const History<Pose>&, Object*)
 DQSLAM_INSTANTIATE(Se2);
 DQSLAM_INSTANTIATE(Se3);

@@ -17,6 +17,13 @@ double Settle(const Model& model,
 template <typename Pose>
 Vector9d Birth(const Model& model, const History<Pose>& history, const Object& object);
 
+/// From all its boxes: the sphere that fits their tangents, or of the prior size.
+template <typename Pose>
+Vector9d StartAgain(const Model& model,
+                    const History<Pose>& history,
+                    const Object& object,
+                    bool by_size);
+
 /// Starts an object again from all its boxes, and keeps what fits them better.
 template <typename Pose>
 void TryAgain(const Model& model, const History<Pose>& history, Object* object);
