@@ -7,7 +7,8 @@ namespace dqslam::online {
 namespace {
 
 constexpr double kLeastDamping = 1e-9, kMostDamping = 1e3;
-constexpr double kTolerance = 1e-4;
+// Of the cost: a decrease of half is one sigma of what is determined worst.
+constexpr double kTolerance = 1e-2;
 // Mean chi-square of an object's sights, 4 where all is well, from which on it is in a wrong place.
 constexpr double kMisfit = 4 * 4;
 constexpr int kFewestSights = 3;
@@ -76,7 +77,7 @@ Work Region<Pose>::Minimize(
     *damping = std::max(*damping / 5, kLeastDamping);
     work.cost = after;
     work.moved = true;
-    if (before - after < kTolerance * std::abs(before)) break;
+    if (before - after < kTolerance) break;
   }
   for (const Local& local : locals_) {
     local_of_object_[local.object] = -1;

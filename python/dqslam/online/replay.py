@@ -1,0 +1,72 @@
+"""A recording step by step, as it would have arrived."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from time import perf_counter
+
+import numpy as np
+
+from dqslam import _core
+from dqslam.online.slam import OnlineSlam
+from dqslam.online.step import Motion, Step, StepBoxes, StepPositions
+from dqslam.recording import Recording
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """How a step went."""
+
+    step: Step
+    report: _core.StepReport
+    milliseconds: float
+    """Wall clock of ``add``."""
+
+
+def steps_of(recording: Recording) -> Iterator[Step]:
+    """Go through a recording in the order of time."""
+    odometry, detections = recording.odometry, recording.detections
+    count = len(recording.timestamps)
+    order = np.argsort(detections.pose, kind="stable")
+    begin = np.searchsorted(detections.pose[order], np.arange(count + 1))
+    names = [detections.class_names[number] for number in detections.class_id.tolist()]
+    positions = recording.positions
+    for pose in range(count):
+        rows = order[begin[pose] : begin[pose + 1]]
+        motion = None
+        if pose:
+            motion = Motion(odometry.relative[pose - 1], odometry.covariance[pose - 1])
+        yield Step(
+            timestamp=float(recording.timestamps[pose]),
+            odometry=motion,
+            boxes=StepBoxes(
+                box=detections.box[rows],
+                object_id=detections.object_id[rows],
+                class_name=[names[row] for row in rows],
+                truncated=detections.truncated[rows],
+            ),
+            positions=None if positions is None else _positions_at(positions, pose),
+        )
+
+
+def _positions_at(positions: object, pose: int) -> StepPositions | None:
+    from dqslam.recording import RelativePositions
+
+    assert isinstance(positions, RelativePositions)
+    rows = np.flatnonzero(positions.pose == pose)
+    if not rows.size:
+        return None
+    return StepPositions(
+        positions.object_id[rows], positions.object_in_robot[rows], positions.covariance[rows]
+    )
+
+
+def replay(slam: OnlineSlam, recording: Recording) -> Iterator[Frame]:
+    """Feed a recording to a session, and tell how each step went."""
+    for step in steps_of(recording):
+        start = perf_counter()
+        report = slam.add(
+            step.odometry, step.boxes, timestamp=step.timestamp, positions=step.positions
+        )
+        yield Frame(step, report, 1e3 * (perf_counter() - start))
