@@ -125,24 +125,25 @@ void BindSession(py::module_& m) {
           "Add a pose and what it saw: covariance (k, k), boxes (n, 4) with covariances (n, 16), "
           "positions (p, 3) with covariances (p, 9), size priors of the new objects. The first "
           "pose's relative is the pose itself, exact if its covariance is empty.")
-      .def("add_map_object",
-           [](Session& session,
-              const Vector9d& ellipsoid,
-              const online::Matrix9d& covariance,
-              double log_size_mean,
-              double log_size_sigma) {
-             session.AddMapObject(ellipsoid, covariance, {log_size_mean, log_size_sigma});
-           },
-           "ellipsoid"_a,
-           "covariance"_a,
-           "log_size_mean"_a,
-           "log_size_sigma"_a,
-           "Add an object of a known map, and the covariance of its parameters, (9, 9).")
+      .def(
+          "add_map_object",
+          [](Session& session,
+             const Vector9d& ellipsoid,
+             const online::Matrix9d& covariance,
+             double log_size_mean,
+             double log_size_sigma) {
+            session.AddMapObject(ellipsoid, covariance, {log_size_mean, log_size_sigma});
+          },
+          "ellipsoid"_a,
+          "covariance"_a,
+          "log_size_mean"_a,
+          "log_size_sigma"_a,
+          "Add an object of a known map, and the covariance of its parameters, (9, 9).")
       .def(
           "smooth",
           [](Session& session, int iterations) {
             const py::gil_scoped_release no_gil;
-            return session.Smooth(iterations).cost;
+            return session.Smooth(iterations);
           },
           "iterations"_a,
           "Minimise all poses, the map's priors included; returns the cost.")
@@ -207,7 +208,8 @@ void BindRelocalise(py::module_& m) {
       "truncated"_a,
       "candidates"_a,
       "fewest"_a,
-      "Find the pose from boxes (b, 4) of objects (o, 9), with covariances (o, 81) and (b, 16); the "
+      "Find the pose from boxes (b, 4) of objects (o, 9), with covariances (o, 81) and (b, 16); "
+      "the "
       "candidates of a box are rows of objects that it may show. ValueError where there is none.");
 }
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:  # what type checkers see; a test holds it and the table below together
     from dqslam._core import Camera as Camera
     from dqslam._core import Loss as Loss
+    from dqslam._core import OnlineOptions as OnlineOptions
     from dqslam._core import PoseModel as PoseModel
     from dqslam._core import ScenePriors as ScenePriors
     from dqslam._core import SolveOptions as SolveOptions
@@ -28,6 +29,13 @@ if TYPE_CHECKING:  # what type checkers see; a test holds it and the table below
     from dqslam.io import load_recording as load_recording
     from dqslam.io import load_results as load_results
     from dqslam.io import save_estimate as save_estimate
+    from dqslam.online import Motion as Motion
+    from dqslam.online import OnlineSlam as OnlineSlam
+    from dqslam.online import Step as Step
+    from dqslam.online import StepBoxes as StepBoxes
+    from dqslam.online import StepError as StepError
+    from dqslam.online import StepPositions as StepPositions
+    from dqslam.online import steps_of as steps_of
     from dqslam.plot import plot_maps as plot_maps
     from dqslam.problem import BoxNoise as BoxNoise
     from dqslam.problem import Graph as Graph
@@ -50,7 +58,15 @@ if TYPE_CHECKING:  # what type checkers see; a test holds it and the table below
     from dqslam.uncertainty import posterior_bound as posterior_bound
 
 _NAMES = {
-    "dqslam._core": ("Camera", "Loss", "PoseModel", "ScenePriors", "SolveOptions", "Summary"),
+    "dqslam._core": (
+        "Camera",
+        "Loss",
+        "OnlineOptions",
+        "PoseModel",
+        "ScenePriors",
+        "SolveOptions",
+        "Summary",
+    ),
     "dqslam.associate": ("Association", "associate"),
     "dqslam.estimate": ("Estimate",),
     "dqslam.evaluate": (
@@ -63,6 +79,15 @@ _NAMES = {
     "dqslam.evaluate_results": ("evaluate_results",),
     "dqslam.experiment": ("run_paper",),
     "dqslam.io": ("load_recording", "load_results", "save_estimate"),
+    "dqslam.online": (
+        "Motion",
+        "OnlineSlam",
+        "Step",
+        "StepBoxes",
+        "StepError",
+        "StepPositions",
+        "steps_of",
+    ),
     "dqslam.plot": ("plot_maps",),
     "dqslam.problem": ("BoxNoise", "Graph", "build_graph", "solve"),
     "dqslam.recording": ("Detections", "Odometry", "Recording", "RelativePositions", "Truth"),

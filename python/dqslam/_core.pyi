@@ -20,14 +20,18 @@ __all__: list[str] = [
     "Loss",
     "Minimizer",
     "Mode",
+    "OnlineOptions",
     "PoseModel",
+    "Relocation",
     "Residual",
     "ScenePriors",
     "Schedule",
+    "Session",
     "Solution",
     "SolveOptions",
     "Start",
     "State",
+    "StepReport",
     "Summary",
     "axes_from_ellipsoid",
     "between",
@@ -43,6 +47,7 @@ __all__: list[str] = [
     "minus",
     "plus",
     "project_to_boxes",
+    "relocalise",
     "solve",
     "world_from_camera",
 ]
@@ -582,6 +587,282 @@ class Fit:
         In sigmas, shape (n, k), one row a step.
         """
 
+class Relocation:
+    """
+    Where the robot is in a map, and where else it may be.
+    """
+    @property
+    def chi_square(self) -> float:
+        """
+        Of the boxes that have an object.
+        """
+    @property
+    def covariance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        In the pose's tangent, shape (k, k).
+        """
+    @property
+    def matches(self) -> int:
+        """
+        Boxes that have an object.
+        """
+    @property
+    def object(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]:
+        """
+        Row of the object of each box, -1: none.
+        """
+    @property
+    def other(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        That place, shape (d,).
+        """
+    @property
+    def pose(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        world_from_robot, shape (d,).
+        """
+    @property
+    def runner_up(self) -> float:
+        """
+        Chi-square of the best other place with as many matches; infinite: none.
+        """
+
+class OnlineOptions:
+    """
+    What a caller of a session may choose.
+    """
+    def __init__(self, **kwargs: typing.Any) -> None:
+        """
+        Any of the attributes as keywords.
+        """
+    @property
+    def lap_every(self) -> int:
+        """
+        each so many steps.
+        """
+    @lap_every.setter
+    def lap_every(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    @property
+    def lap_poses(self) -> int:
+        """
+        Minimised rarely,
+        """
+    @lap_poses.setter
+    def lap_poses(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    @property
+    def loop_absence(self) -> int:
+        """
+        Poses without a sight before an object closes a loop.
+        """
+    @loop_absence.setter
+    def loop_absence(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    @property
+    def loop_chi_square(self) -> float:
+        """
+        Of the window, per residual: the loop does not fit.
+        """
+    @loop_chi_square.setter
+    def loop_chi_square(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def loop_iterations(self) -> int:
+        """
+        Levenberg-Marquardt steps over a loop.
+        """
+    @loop_iterations.setter
+    def loop_iterations(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    @property
+    def loss_scale(self) -> float:
+        """
+        Of a Cauchy loss on boxes, sigmas of a box; 0: least squares.
+        """
+    @loss_scale.setter
+    def loss_scale(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def misfit_chi_square(self) -> float:
+        """
+        Of the window, per residual: its objects start again.
+        """
+    @misfit_chi_square.setter
+    def misfit_chi_square(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def recent_every(self) -> int:
+        """
+        each so many steps.
+        """
+    @recent_every.setter
+    def recent_every(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    @property
+    def recent_poses(self) -> int:
+        """
+        Minimised now and then,
+        """
+    @recent_poses.setter
+    def recent_poses(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    @property
+    def recover_every(self) -> int:
+        """
+        Steps between two such starts, at least.
+        """
+    @recover_every.setter
+    def recover_every(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    @property
+    def smoothing_iterations(self) -> int:
+        """
+        Levenberg-Marquardt steps of these two.
+        """
+    @smoothing_iterations.setter
+    def smoothing_iterations(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    @property
+    def window_iterations(self) -> int:
+        """
+        Levenberg-Marquardt steps of the window.
+        """
+    @window_iterations.setter
+    def window_iterations(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    @property
+    def window_poses(self) -> int:
+        """
+        Minimised at every step.
+        """
+    @window_poses.setter
+    def window_poses(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+
+class StepReport:
+    """
+    What a step cost.
+    """
+    @property
+    def chi_square(self) -> float:
+        """
+        Of the window, per residual: 1 where the model is right.
+        """
+    @property
+    def closed_loop(self) -> bool: ...
+    @property
+    def linearized(self) -> int:
+        """
+        Sights, in the window and to keep what lies before it.
+        """
+    @property
+    def pose(self) -> int:
+        """
+        Row of the new pose.
+        """
+    @property
+    def recovered(self) -> bool:
+        """
+        Young objects were started again.
+        """
+    @property
+    def smoothed_poses(self) -> int:
+        """
+        Poses minimised beside the window; 0 at most steps.
+        """
+    @property
+    def smoothed_sights(self) -> int:
+        """
+        Sights linearised there.
+        """
+    @property
+    def undefined(self) -> int:
+        """
+        Sights of the window whose objects are not in front.
+        """
+    @property
+    def window_objects(self) -> int:
+        """
+        Objects that it saw.
+        """
+    @property
+    def window_poses(self) -> int:
+        """
+        Poses of the window.
+        """
+
+class Session:
+    """
+    Estimation step by step.
+    """
+    def __init__(
+        self,
+        pose_model: PoseModel,
+        camera: Camera,
+        scene_priors: ScenePriors = ...,
+        options: OnlineOptions = ...,
+    ) -> None: ...
+    def add(
+        self,
+        relative: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        covariance: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+        object: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
+        box: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+        box_covariance: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+        truncated: typing.Annotated[numpy.typing.ArrayLike, numpy.bool, "[m, n]"],
+        position_object: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
+        position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+        position_covariance: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+        log_size_mean: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        log_size_sigma: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    ) -> StepReport:
+        """
+        Add a pose and what it saw: covariance (k, k), boxes (n, 4) with covariances (n, 16), positions (p, 3) with covariances (p, 9), size priors of the new objects. The first pose's relative is the pose itself, exact if its covariance is empty.
+        """
+    def add_map_object(
+        self,
+        ellipsoid: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[9, 1]"],
+        covariance: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[9, 9]"],
+        log_size_mean: typing.SupportsFloat | typing.SupportsIndex,
+        log_size_sigma: typing.SupportsFloat | typing.SupportsIndex,
+    ) -> None:
+        """
+        Add an object of a known map, and the covariance of its parameters, (9, 9).
+        """
+    def clone(self) -> Session:
+        """
+        A copy that goes its own way.
+        """
+    def merge(
+        self,
+        poses: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+        ellipsoids: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    ) -> None:
+        """
+        Take over an estimate of the first poses and objects; later ones move with them.
+        """
+    def pose_at(
+        self, row: typing.SupportsInt | typing.SupportsIndex
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        Shape (d,).
+        """
+    def smooth(self, iterations: typing.SupportsInt | typing.SupportsIndex) -> float:
+        """
+        Minimise all poses, the map's priors included; returns the cost.
+        """
+    def to_graph(self) -> tuple[Graph, list[int]]:
+        """
+        The problem so far, and the row of each of its objects.
+        """
+    @property
+    def ellipsoids(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Shape (o, 9).
+        """
+    @property
+    def num_objects(self) -> int: ...
+    @property
+    def num_poses(self) -> int: ...
+    @property
+    def observations(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]:
+        """
+        Boxes per object, (o,).
+        """
+    @property
+    def poses(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Shape (n, d).
+        """
+
 def axes_from_ellipsoid(
     ellipsoid: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[9, 1]"],
 ) -> tuple[
@@ -700,6 +981,23 @@ def project_to_boxes(
 ]:
     """
     Boxes (n, 4) of ellipsoid i from pose i [undistorted px], and whether it is strictly in front (n,); NaN where it is not.
+    """
+
+def relocalise(
+    pose_model: PoseModel,
+    camera: Camera,
+    ellipsoids: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    covariance: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    box: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    box_covariance: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    truncated: typing.Annotated[numpy.typing.ArrayLike, numpy.bool, "[m, n]"],
+    candidates: collections.abc.Sequence[
+        collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]
+    ],
+    fewest: typing.SupportsInt | typing.SupportsIndex,
+) -> Relocation:
+    """
+    Find the pose from boxes (b, 4) of objects (o, 9), with covariances (o, 81) and (b, 16); the candidates of a box are rows of objects that it may show. ValueError where there is none.
     """
 
 def solve(graph: Graph, options: SolveOptions = ..., start: State | None = None) -> Solution:

@@ -1,6 +1,7 @@
 // Coordinates of an object in which information adds up.
 //
-//   chart   [cx, cy, cz, S00, S01, S02, S11, S12, S22]: centre and shape.  A Gaussian in it needs no
+//   chart   [cx, cy, cz, S00, S01, S02, S11, S12, S22]: centre and shape.  A Gaussian in it needs
+//   no
 //           transport when the object moves, and it is the space in which EllipsoidManifold goes
 //           straight.
 #pragma once

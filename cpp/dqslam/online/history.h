@@ -43,10 +43,10 @@ struct History {
   using Square = Eigen::Matrix<double, Pose::kTangentSize, Pose::kTangentSize>;
 
   struct Step {
-    Storage relative;         ///< to this pose from the one before
+    Storage relative;  ///< to this pose from the one before
     Square covariance;
     Square sqrt_information;
-    int first_sight;          ///< row of the first sight from this pose
+    int first_sight;  ///< row of the first sight from this pose
   };
 
   std::vector<Storage> poses;

@@ -1,7 +1,13 @@
 #include "dqslam/online/linearize.h"
 
+#include <ceres/jet.h>
+
 #include <cmath>
 #include <limits>
+
+#include "dqslam/costs/odometry.h"
+#include "dqslam/costs/scene_priors.h"
+#include "dqslam/costs/size_prior.h"
 
 namespace dqslam::online {
 namespace {
@@ -47,7 +53,8 @@ void BoxError(const Camera& camera,
   }
 }
 
-// Derivatives of focal (a n.dp + b n^T dS n), the camera's frame, for the edge of axis and normal n.
+// Derivatives of focal (a n.dp + b n^T dS n), the camera's frame, for the edge of axis and normal
+// n.
 template <typename Pose>
 void SetEdge(const Stand& stand,
              const Surface<double>& object,
@@ -61,8 +68,7 @@ void SetEdge(const Stand& stand,
   const Vector3d w = stand.camera.camera_from_world.transpose() * n;
   const Vector3d in_robot = R.transpose() * w;
   const Vector3d v = R.transpose() * (object.shape * w);
-  SetTangent<Pose>(
-      -a * in_robot, -(a * q + 2 * b * v).cross(in_robot), linear->by_pose.row(edge));
+  SetTangent<Pose>(-a * in_robot, -(a * q + 2 * b * v).cross(in_robot), linear->by_pose.row(edge));
   linear->by_object.row(edge) << a * w.transpose(), b * w[0] * w[0], 2 * b * w[0] * w[1],
       2 * b * w[0] * w[2], b * w[1] * w[1], 2 * b * w[1] * w[2], b * w[2] * w[2];
 }
@@ -177,14 +183,10 @@ double CostOfSight(const Model& model,
   *chi_square = std::numeric_limits<double>::infinity();
   if (!sight.is_box) {
     const Rigid<double>& robot = stand.world_from_robot;
-    error.head<3>() = sight.value.head<3>() -
-                      robot.rotation.transpose() * (object.center - robot.translation);
-  } else if (!BoxOrTangentError(model.camera,
-                                sight,
-                                ToCamera(stand.camera, object),
-                                depth,
-                                &predicted,
-                                &error)) {
+    error.head<3>() =
+        sight.value.head<3>() - robot.rotation.transpose() * (object.center - robot.translation);
+  } else if (!BoxOrTangentError(
+                 model.camera, sight, ToCamera(stand.camera, object), depth, &predicted, &error)) {
     return *chi_square;
   }
   *chi_square = (sight.sqrt_information * error).squaredNorm();
@@ -206,8 +208,8 @@ void Linearize(const Model& model,
     LinearizeBox<Pose>(model, stand, sight, object, edges, &error, linear);
   } else {
     const Rigid<double>& robot = stand.world_from_robot;
-    error.head<3>() = sight.value.head<3>() -
-                      robot.rotation.transpose() * (object.center - robot.translation);
+    error.head<3>() =
+        sight.value.head<3>() - robot.rotation.transpose() * (object.center - robot.translation);
     linear->depth = 0;
     LinearizePosition<Pose>(stand, object, linear);
   }
@@ -324,13 +326,13 @@ double LinearizeHeight(const Model& model,
   return residual.a;
 }
 
-#define DQSLAM_INSTANTIATE(Pose)                                                            \
-  template void Linearize<Pose>(                                                            \
-      const Model&, const Stand&, const Sight&, const Vector9d&, Edges, Linear<Pose>*);            \
-  template LinearStep<Pose> LinearizeStep<Pose>(                                            \
-      const History<Pose>::Step&, const double*, const double*);                            \
+#define DQSLAM_INSTANTIATE(Pose)                                                              \
+  template void Linearize<Pose>(                                                              \
+      const Model&, const Stand&, const Sight&, const Vector9d&, Edges, Linear<Pose>*);       \
+  template LinearStep<Pose> LinearizeStep<Pose>(                                              \
+      const History<Pose>::Step&, const double*, const double*);                              \
   template double CostOfStep<Pose>(const History<Pose>::Step&, const double*, const double*); \
-  template double LinearizeHeight<Pose>(                                                    \
+  template double LinearizeHeight<Pose>(                                                      \
       const Model&, const double*, Eigen::Matrix<double, Pose::kTangentSize, 1>*)
 DQSLAM_INSTANTIATE(Se2);
 DQSLAM_INSTANTIATE(Se3);

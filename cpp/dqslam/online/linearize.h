@@ -7,14 +7,10 @@
 //   by the centre a n;  by S  b n n^T;  by the pose's translation  -a n;  by its rotation
 //   -a q x n - 2 b v x n;  with a = (n.p) / e and b = -1 / (2 e).
 // Where the object is not strictly in front, the tangent residual takes the place of the box's, see
-// costs/tangent.h: n.p + |L^T n| with the n of the observed edge, hence a = +-1, b = 1 / (2 |L^T n|).
+// costs/tangent.h: n.p + |L^T n| with the n of the observed edge, hence a = +-1, b = 1 / (2 |L^T
+// n|).
 #pragma once
 
-#include <ceres/jet.h>
-
-#include "dqslam/costs/odometry.h"
-#include "dqslam/costs/scene_priors.h"
-#include "dqslam/costs/size_prior.h"
 #include "dqslam/graph.h"
 #include "dqslam/online/history.h"
 

@@ -5,7 +5,7 @@ namespace dqslam::online {
 
 struct OnlineOptions {
   int window_poses = 10;           ///< minimised at every step
-  int window_iterations = 2;       ///< Levenberg-Marquardt steps of the window
+  int window_iterations = 1;       ///< Levenberg-Marquardt steps of the window
   int recent_poses = 64;           ///< minimised now and then,
   int recent_every = 16;           ///< each so many steps
   int lap_poses = 640;             ///< minimised rarely,

@@ -245,8 +245,7 @@ double Region<Pose>::TrialCost(const History<Pose>& history, Work* work) {
       const Sight& sight = history.sights[row];
       Local& local = locals_[local_of_object_[sight.object]];
       double chi_square;
-      measured +=
-          CostOfSight(model_, stand, sight, local.trial, depth_[row - first], &chi_square);
+      measured += CostOfSight(model_, stand, sight, local.trial, depth_[row - first], &chi_square);
       if (!std::isfinite(chi_square)) return chi_square;
       local.chi_square += chi_square;
       ++local.sights;
@@ -258,10 +257,10 @@ double Region<Pose>::TrialCost(const History<Pose>& history, Work* work) {
   return cost + measured;
 }
 
-#define DQSLAM_INSTANTIATE(Pose)                                                      \
-  template class Region<Pose>;                                                        \
-  template int CountPast<Pose>(const History<Pose>&, const Object&, int, int);        \
-  template void AddPast<Pose>(                                                        \
+#define DQSLAM_INSTANTIATE(Pose)                                               \
+  template class Region<Pose>;                                                 \
+  template int CountPast<Pose>(const History<Pose>&, const Object&, int, int); \
+  template void AddPast<Pose>(                                                 \
       const Model&, const History<Pose>&, const Object&, int, int, Quadratic*)
 DQSLAM_INSTANTIATE(Se2);
 DQSLAM_INSTANTIATE(Se3);

@@ -12,12 +12,12 @@ namespace dqslam::online {
 /// What a minimisation did: work and result.
 struct Work {
   int poses = 0, objects = 0;
-  int linearized = 0;     ///< sights, over all iterations, of older poses too
-  int undefined = 0;      ///< sights whose objects are not in front
-  double chi_square = 0;  ///< of steps and sights of the region, at the end
-  int residuals = 0;      ///< how many numbers that is the sum of
-  double cost = 0;        ///< at the end, priors and older sights included
-  bool moved = false;     ///< whether an iteration was accepted
+  int linearized = 0;        ///< sights, over all iterations, of older poses too
+  int undefined = 0;         ///< sights whose objects are not in front
+  double chi_square = 0;     ///< of steps and sights of the region, at the end
+  int residuals = 0;         ///< how many numbers that is the sum of
+  double cost = 0;           ///< at the end, priors and older sights included
+  bool moved = false;        ///< whether an iteration was accepted
   std::vector<int> misfits;  ///< objects that their sights in the region do not fit
 };
 

@@ -7,16 +7,17 @@
 #include <stdexcept>
 
 #include "dqslam/dispatch.h"
+#include "dqslam/online/linearize.h"
 #include "dqslam/whitening.h"
 
 namespace dqslam::online {
 namespace {
 
-constexpr int kHeadings = 24;     // of SE(2)
-constexpr int kRotations = 400;   // of SE(3): about 30 degrees apart
+constexpr int kHeadings = 24;    // of SE(2)
+constexpr int kRotations = 400;  // of SE(3): about 30 degrees apart
 constexpr int kIterations = 15;
-constexpr int kSeedBoxes = 3;     // that hypotheses set out from
-constexpr double kGate = 18.47;   // chi-square of 4 degrees of freedom, 99.9 %
+constexpr int kSeedBoxes = 3;                       // that hypotheses set out from
+constexpr double kGate = 18.47;                     // chi-square of 4 degrees of freedom, 99.9 %
 constexpr double kApart_m = 0.3, kApart_rad = 0.1;  // two places, not one
 
 using Match = std::pair<int, int>;  // box, object
@@ -161,9 +162,8 @@ class Search {
     Sight bare = sight;
     bare.sqrt_information.setIdentity();
     Linearize<Pose>(model_, stand, bare, charts_[match.second], Edges::kBox, &linear);
-    const Eigen::Matrix4d total =
-        noise_[match.first] +
-        linear.by_object * spread_[match.second] * linear.by_object.transpose();
+    const Eigen::Matrix4d total = noise_[match.first] + linear.by_object * spread_[match.second] *
+                                                            linear.by_object.transpose();
     const Eigen::LLT<Eigen::Matrix4d> cholesky(total);
     if (cholesky.info() != Eigen::Success) return sight;
     sight.sqrt_information = cholesky.matrixL().solve(Eigen::Matrix4d::Identity());
@@ -278,10 +278,7 @@ class Search {
 
 }  // namespace
 
-Relocation Relocalise(PoseModel pose_model,
-                      const Camera& camera,
-                      const MapView& view,
-                      int fewest) {
+Relocation Relocalise(PoseModel pose_model, const Camera& camera, const MapView& view, int fewest) {
   const auto shown = std::count_if(view.candidates.begin(),
                                    view.candidates.end(),
                                    [](const auto& objects) { return !objects.empty(); });

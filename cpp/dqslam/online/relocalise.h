@@ -6,15 +6,14 @@
 #pragma once
 
 #include "dqslam/graph.h"
-#include "dqslam/online/linearize.h"
 
 namespace dqslam::online {
 
 /// A map and one image.
 struct MapView {
-  RowMatrix ellipsoids;  ///< (objects, 9) log-Cholesky parameters
-  RowMatrix covariance;  ///< (objects, 81) of these
-  RowMatrix box;         ///< (boxes, 4) undistorted pixels
+  RowMatrix ellipsoids;      ///< (objects, 9) log-Cholesky parameters
+  RowMatrix covariance;      ///< (objects, 81) of these
+  RowMatrix box;             ///< (boxes, 4) undistorted pixels
   RowMatrix box_covariance;  ///< (boxes, 16) pixels^2
   BoolTable truncated;       ///< (boxes, 4)
   /// Objects that each box may show; of one that is known, that one.
@@ -22,20 +21,17 @@ struct MapView {
 };
 
 struct Relocation {
-  Eigen::VectorXd pose;      ///< world_from_robot
-  RowMatrix covariance;      ///< (k, k) in the tangent of the pose, of the map's errors too
-  IndexVector object;        ///< of each box; -1 for none
-  double chi_square = 0;     ///< of the boxes that have an object
-  int matches = 0;           ///< these boxes
-  double runner_up = 0;      ///< chi-square of the best other place with as many; infinite: none
-  Eigen::VectorXd other;     ///< that place
+  Eigen::VectorXd pose;   ///< world_from_robot
+  RowMatrix covariance;   ///< (k, k) in the tangent of the pose, of the map's errors too
+  IndexVector object;     ///< of each box; -1 for none
+  double chi_square = 0;  ///< of the boxes that have an object
+  int matches = 0;        ///< these boxes
+  double runner_up = 0;   ///< chi-square of the best other place with as many; infinite: none
+  Eigen::VectorXd other;  ///< that place
 };
 
 /// Throws std::invalid_argument where fewer boxes than `fewest` show objects of the map, or none of
 /// the hypotheses explains so many of them.
-Relocation Relocalise(PoseModel pose_model,
-                      const Camera& camera,
-                      const MapView& view,
-                      int fewest);
+Relocation Relocalise(PoseModel pose_model, const Camera& camera, const MapView& view, int fewest);
 
 }  // namespace dqslam::online

@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "dqslam/dispatch.h"
+#include "dqslam/online/region.h"
 #include "dqslam/online/start.h"
 #include "dqslam/whitening.h"
 
@@ -160,15 +161,16 @@ class SessionOf : public Session {
     return copy;
   }
 
-  Work Smooth(int iterations) override {
+  double Smooth(int iterations) override {
     double damping = kFirstDamping;
     const Work work = region_.Minimize(&history_, 0, Past::kAnew, iterations, &damping);
     MarkStale(0);
-    return work;
+    return work.cost;
   }
 
   void Merge(const RowMatrix& poses, const RowMatrix& ellipsoids) override {
-    const int merged = static_cast<int>(poses.rows()), objects = static_cast<int>(ellipsoids.rows());
+    const int merged = static_cast<int>(poses.rows()),
+              objects = static_cast<int>(ellipsoids.rows());
     if (merged < 1 || merged > num_poses() || objects > num_objects() ||
         poses.cols() != Pose::kSize || (objects > 0 && ellipsoids.cols() != kLandmarkSize) ||
         !poses.allFinite() || !ellipsoids.allFinite()) {
@@ -270,8 +272,8 @@ class SessionOf : public Session {
       object.chart = Birth(model_, history_, object);
     }
     const int count = static_cast<int>(object.sights.size());
-    const bool again = std::find(std::begin(kTryAgainAt), std::end(kTryAgainAt), count) !=
-                       std::end(kTryAgainAt);
+    const bool again =
+        std::find(std::begin(kTryAgainAt), std::end(kTryAgainAt), count) != std::end(kTryAgainAt);
     if (again && object.map.H.isZero(0)) {
       TryAgain(model_, history_, &object);
       object.is_stale = true;
@@ -282,8 +284,7 @@ class SessionOf : public Session {
     StepReport report;
     const int end = num_poses();
     report.pose = end - 1;
-    const int begin =
-        std::max(end - options_.window_poses, history_.first_pose_is_known ? 1 : 0);
+    const int begin = std::max(end - options_.window_poses, history_.first_pose_is_known ? 1 : 0);
     if (begin >= end) return report;
     report.linearized = KeepPast(begin);
     damping_ = std::min(damping_, kMostDamping);
@@ -316,22 +317,20 @@ class SessionOf : public Session {
   void Recover(StepReport* report) {
     const int end = num_poses();
     next_recovery_ = end + options_.recover_every;
-    const int begin =
-        std::max(end - options_.recent_poses, history_.first_pose_is_known ? 1 : 0);
+    const int begin = std::max(end - options_.recent_poses, history_.first_pose_is_known ? 1 : 0);
     std::vector<int> objects;
     for (int row = history_.SightsBefore(begin); row < static_cast<int>(history_.sights.size());
          ++row) {
       const int object = history_.sights[row].object;
-      const bool is_young =
-          history_.objects[object].sights.front() >= history_.SightsBefore(begin);
+      const bool is_young = history_.objects[object].sights.front() >= history_.SightsBefore(begin);
       if (is_young && history_.objects[object].map.H.isZero(0) &&
           std::find(objects.begin(), objects.end(), object) == objects.end()) {
         objects.push_back(object);
       }
     }
     double damping = kFirstDamping;
-    double best = Cost(region_.Minimize(
-        &history_, begin, Past::kAnew, options_.smoothing_iterations, &damping));
+    double best = Cost(
+        region_.Minimize(&history_, begin, Past::kAnew, options_.smoothing_iterations, &damping));
     for (const bool by_size : {false, true}) {
       const std::vector<Storage> poses(history_.poses.begin() + begin, history_.poses.end());
       std::vector<Vector9d> charts;
@@ -342,8 +341,7 @@ class SessionOf : public Session {
                       history_.poses[pose].data());
       }
       for (const int row : objects) {
-        history_.objects[row].chart =
-            StartAgain(model_, history_, history_.objects[row], by_size);
+        history_.objects[row].chart = StartAgain(model_, history_, history_.objects[row], by_size);
       }
       damping = kFirstDamping;
       region_.Minimize(
@@ -446,7 +444,7 @@ class SessionOf : public Session {
   int loop_until_ = -1;             // until when the window is watched for it
   int next_lap_ = kSoonestLap;
   int next_recovery_ = 0;
-  double loop_credit_ = 1;          // loops that may be closed now
+  double loop_credit_ = 1;  // loops that may be closed now
 };
 
 template <typename Pose>
@@ -495,11 +493,15 @@ Graph SessionOf<Pose>::ToGraph(std::vector<int>* rows) const {
   for (const Sight& sight : history_.sights) {
     if (takes_part(sight)) ++(sight.is_box ? boxes : positions);
   }
-  graph.boxes = {IndexVector(boxes), IndexVector(boxes), RowMatrix(boxes, kBoxSize),
-                 RowMatrix(boxes, 16), BoolTable(boxes, kBoxSize)};
-  graph.positions = {
-      IndexVector(positions), IndexVector(positions), RowMatrix(positions, 3),
-      RowMatrix(positions, 9)};
+  graph.boxes = {IndexVector(boxes),
+                 IndexVector(boxes),
+                 RowMatrix(boxes, kBoxSize),
+                 RowMatrix(boxes, 16),
+                 BoolTable(boxes, kBoxSize)};
+  graph.positions = {IndexVector(positions),
+                     IndexVector(positions),
+                     RowMatrix(positions, 3),
+                     RowMatrix(positions, 9)};
   boxes = positions = 0;
   for (const Sight& sight : history_.sights) {
     if (!takes_part(sight)) continue;
@@ -534,11 +536,10 @@ std::unique_ptr<Session> Session::Make(PoseModel pose_model,
                                        const OnlineOptions& options) {
   camera.Validate();
   const bool good = options.window_poses > 0 && options.window_iterations > 0 &&
-                    options.recent_poses > 0 && options.recent_every > 0 &&
-                    options.lap_poses > 0 && options.lap_every > 0 &&
-                    options.smoothing_iterations > 0 && options.loop_absence > 0 &&
-                    options.loop_chi_square > 0 && options.loop_iterations > 0 &&
-                    options.loss_scale >= 0;
+                    options.recent_poses > 0 && options.recent_every > 0 && options.lap_poses > 0 &&
+                    options.lap_every > 0 && options.smoothing_iterations > 0 &&
+                    options.loop_absence > 0 && options.loop_chi_square > 0 &&
+                    options.loop_iterations > 0 && options.loss_scale >= 0;
   if (!good) throw std::invalid_argument("online options: all must be positive");
   return Dispatch(pose_model, [&](auto pose) -> std::unique_ptr<Session> {
     return std::make_unique<SessionOf<decltype(pose)>>(camera, scene, options);

@@ -9,8 +9,9 @@
 #include <memory>
 
 #include "dqslam/graph.h"
+#include "dqslam/initialize.h"
+#include "dqslam/online/chart.h"
 #include "dqslam/online/options.h"
-#include "dqslam/online/region.h"
 
 namespace dqslam::online {
 
@@ -61,8 +62,8 @@ class Session {
                             const Matrix9d& covariance,
                             const SizePrior& size) = 0;
 
-  /// Levenberg-Marquardt on all poses, priors of the map included.
-  virtual Work Smooth(int iterations) = 0;
+  /// Levenberg-Marquardt on all poses, priors of the map included; returns the cost.
+  virtual double Smooth(int iterations) = 0;
 
   /// Takes over what was estimated elsewhere of the first poses and objects.  Later ones move
   /// rigidly with the last of these poses.
@@ -75,8 +76,8 @@ class Session {
   virtual int num_poses() const = 0;
   virtual int num_objects() const = 0;
   virtual Eigen::VectorXd PoseAt(int row) const = 0;
-  virtual RowMatrix Poses() const = 0;       ///< (poses, d)
-  virtual RowMatrix Ellipsoids() const = 0;  ///< (objects, 9) log-Cholesky parameters
+  virtual RowMatrix Poses() const = 0;           ///< (poses, d)
+  virtual RowMatrix Ellipsoids() const = 0;      ///< (objects, 9) log-Cholesky parameters
   virtual IndexVector Observations() const = 0;  ///< boxes of each object
 };
 

@@ -12,9 +12,7 @@ constexpr int kSettleIterations = 6;
 constexpr double kUndefinedCost = 50;
 
 template <typename Pose>
-std::vector<View> ViewsOf(const Model& model,
-                          const History<Pose>& history,
-                          const Object& object) {
+std::vector<View> ViewsOf(const Model& model, const History<Pose>& history, const Object& object) {
   std::vector<View> views;
   for (const int row : object.sights) {
     const Sight& sight = history.sights[row];
@@ -94,8 +92,8 @@ double Settle(const Model& model,
   }
   // A place where a sight is impossible is worth little, however well the tangents fit there.
   return cost + kUndefinedCost * std::count_if(depths.begin(), depths.end(), [](double depth) {
-           return depth > 0;
-         });
+                  return depth > 0;
+                });
 }
 
 template <typename Pose>
@@ -136,12 +134,10 @@ void TryAgain(const Model& model, const History<Pose>& history, Object* object) 
   object->chart = here;
 }
 
-#define DQSLAM_INSTANTIATE(Pose)                                                             \
-  template double Settle<Pose>(                                                              \
-      const Model&, const History<Pose>&, const Object&, int, Vector9d*);                    \
-  template Vector9d Birth<Pose>(const Model&, const History<Pose>&, const Object&);          \
-  template Vector9d StartAgain<Pose>(                                                        \
-      const Model&, const History<Pose>&, const Object&, bool);                              \
+#define DQSLAM_INSTANTIATE(Pose)                                                                   \
+  template double Settle<Pose>(const Model&, const History<Pose>&, const Object&, int, Vector9d*); \
+  template Vector9d Birth<Pose>(const Model&, const History<Pose>&, const Object&);                \
+  template Vector9d StartAgain<Pose>(const Model&, const History<Pose>&, const Object&, bool);     \
   template void TryAgain<Pose>(const Model&, const History<Pose>&, Object*)
 DQSLAM_INSTANTIATE(Se2);
 DQSLAM_INSTANTIATE(Se3);

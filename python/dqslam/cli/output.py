@@ -101,6 +101,18 @@ class Output:
             yield lambda: update(next(ended) / total)
 
     @contextmanager
+    def live(self, what: str) -> Iterator[Callable[[str], None]]:
+        """Show a line that changes as often as one likes; gives what to tell its text to."""
+        from rich.console import Console
+
+        console = Console(stderr=True)
+        if not self._shows_progress or not console.is_terminal:
+            yield lambda text: None
+            return
+        with console.status(what) as status:
+            yield status.update
+
+    @contextmanager
     def waiting(self, what: str) -> Iterator[None]:
         """Show that something goes on of which nobody knows how long it takes, and since when."""
         from rich.progress import SpinnerColumn, TimeElapsedColumn

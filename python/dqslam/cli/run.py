@@ -1,8 +1,10 @@
 """``dqslam run``: a map and a trajectory from the files of a recording."""
 
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -94,6 +96,12 @@ def run(
         float,
         typer.Option(min=0.0, max=0.99, help="Share of boxes that the map is tested on instead."),
     ] = 0.0,
+    online: Annotated[
+        bool,
+        typer.Option(
+            "--online", help="Replay it step by step, as it would arrive, and polish at the end."
+        ),
+    ] = False,
     max_time_difference: MaxTimeDifference = None,
     config: ConfigFile = None,
     quiet: Quiet = False,
@@ -105,6 +113,7 @@ def run(
     report.json and config.toml.
     """
     from dqslam import _core, io, run_recording
+    from dqslam.online.run import describe_step, run_online
     from dqslam.size_prior import load_size_priors
 
     sizes = None if size_priors is None else load_size_priors(size_priors)
@@ -112,6 +121,8 @@ def run(
     believed = parse_noise("--odometry-noise", odometry_noise) or added
     if odometry_covariance is not None and believed is not None:
         raise ValueError("--odometry-covariance: the noise is given already, by another option")
+    if online and (mode == "mapping" or hold_out):
+        raise ValueError("--online: goes neither with --mode mapping nor with --hold-out")
     final = trust_ids == 1.0 and ids != "none"
     names = io.split_formats(formats or [])
     frames = io.choose_frame_times(odometry, detections, names, times=frame_times, rate=frame_rate)
@@ -122,7 +133,7 @@ def run(
         reference = io.read_trajectory(odometry, names.trajectory, frames=frames)
         reference_name = "odometry before the added noise"
     output = Output(quiet=quiet, as_json=json)
-    with results_directory(out), output.share("estimating") as progress:
+    with results_directory(out), _progress(output, online=online) as progress:
         recording, dropped = io.load_recording(
             camera,
             odometry,
@@ -140,17 +151,26 @@ def run(
             recording = run_recording.perturb_odometry(
                 recording, added, seed=seed, believed=believed
             )
-        result = run_recording.run(
-            recording,
-            trust_ids=1.0 if final else min(trust_ids, UNSURE),
-            mode=_core.Mode[mode.upper()],
-            reference=reference,
-            size_prior=sizes,
-            estimates_noise=believed is None and odometry_covariance is None,
-            hold_out=hold_out,
-            seed=seed,
-            progress=progress,
-        )
+        if online:
+            result = run_online(
+                recording,
+                final_ids=final,
+                reference=reference,
+                size_prior=sizes,
+                show=lambda slam, frame: progress(describe_step(slam, frame)),
+            )
+        else:
+            result = run_recording.run(
+                recording,
+                trust_ids=1.0 if final else min(trust_ids, UNSURE),
+                mode=_core.Mode[mode.upper()],
+                reference=reference,
+                size_prior=sizes,
+                estimates_noise=believed is None and odometry_covariance is None,
+                hold_out=hold_out,
+                seed=seed,
+                progress=progress,
+            )
     report = {
         "camera": str(camera),
         "odometry": str(odometry),
@@ -179,6 +199,11 @@ def run(
     output.document(report)
     show_report(output, report)
     output.line(f"wrote {out}")
+
+
+def _progress(output: Output, *, online: bool) -> AbstractContextManager[Callable[[Any], None]]:
+    """Show a line that is told what happens, or a bar that is told the share that is done."""
+    return output.live("loading") if online else output.share("estimating")
 
 
 def parse_noise(option: str, text: str | None) -> "OdometryNoise | None":

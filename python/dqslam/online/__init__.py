@@ -1,10 +1,12 @@
 """Estimation step by step: poses and boxes arrive one at a time, an estimate is wanted now."""
 
 from dqslam._core import OnlineOptions as OnlineOptions
+from dqslam.online.objects import Objects as Objects
+from dqslam.online.polish import Polished as Polished
+from dqslam.online.relocalise import Relocation as Relocation
 from dqslam.online.replay import Frame as Frame
 from dqslam.online.replay import replay as replay
 from dqslam.online.replay import steps_of as steps_of
-from dqslam.online.slam import Objects as Objects
 from dqslam.online.slam import OnlineSlam as OnlineSlam
 from dqslam.online.step import Motion as Motion
 from dqslam.online.step import Step as Step

@@ -7,7 +7,7 @@ image, and become an object when a tracklet is long enough.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -33,7 +33,9 @@ _WRONG_CLASS = 0.02
 
 
 @dataclass
-class _Track:
+class Track:
+    """Boxes that follow each other."""
+
     number: int
     """Object, or -1 while it waits."""
     box: Floats
@@ -44,9 +46,10 @@ class Identifier:
     """Gives boxes of unknown objects to objects."""
 
     def __init__(self, camera: _core.Camera, pose_model: _core.PoseModel) -> None:
+        """Begin without tracks."""
         self._camera = camera
         self._pose_model = pose_model
-        self._tracks: list[_Track] = []
+        self.tracks: list[Track] = []
 
     def identify(
         self,
@@ -55,42 +58,29 @@ class Identifier:
         boxes: CheckedBoxes,
         relative: Floats,
         noise: BoxNoise,
-    ) -> CheckedBoxes:
-        """Return the boxes that show an object, with its id; those that wait are left out."""
+    ) -> tuple[Ints, list[Track]]:
+        """Return the object of each box (b,), -1 for one that waits, and what to follow next.
+
+        Nothing changes until `tracks` is set: the step may yet be refused.
+        """
         chosen = self._by_map(session, registry, boxes, relative, noise)
         taken = set(chosen[chosen >= 0].tolist())
         next_id = registry.next_id()
+        waiting = list(self.tracks)
         tracks = []
-        for row, name in enumerate(boxes.class_name):
-            track = self._track_of(boxes.box[row])
+        for row in range(len(boxes.ids)):
+            track = _take_track(waiting, boxes.box[row])
             length = 1 if track is None else track.length + 1
             number = boxes.ids[row] if boxes.ids[row] >= 0 else int(chosen[row])
             if number < 0 and track is not None and track.number >= 0:
                 number = track.number if track.number not in taken else -1
-            if number < 0 and length >= BIRTH and name:
+            if number < 0 and length >= BIRTH:
                 number, next_id = next_id, next_id + 1
             if number >= 0:
                 taken.add(number)
             chosen[row] = number
-            tracks.append(_Track(number, boxes.box[row], length))
-        self._tracks = tracks
-        known = chosen >= 0
-        return replace(
-            boxes,
-            box=boxes.box[known],
-            object_id=chosen[known],
-            class_name=tuple(boxes.class_name[row] for row in np.flatnonzero(known)),
-            truncated=boxes.truncated[known],
-            ids=chosen[known].tolist(),
-        )
-
-    def _track_of(self, box: Floats) -> _Track | None:
-        """Take out the track whose last box overlaps this one most."""
-        if not self._tracks:
-            return None
-        overlap = box_iou(np.array([track.box for track in self._tracks]), box)
-        best = int(np.argmax(overlap))
-        return self._tracks.pop(best) if overlap[best] >= LEAST_OVERLAP else None
+            tracks.append(Track(number, boxes.box[row], length))
+        return chosen, tracks
 
     def _by_map(
         self,
@@ -140,3 +130,12 @@ class Identifier:
         ids = np.array(registry.ids)
         chosen[clear] = ids[shown[column[clear]]]
         return chosen
+
+
+def _take_track(tracks: list[Track], box: Floats) -> Track | None:
+    """Take out the track whose last box overlaps this one most."""
+    if not tracks:
+        return None
+    overlap = box_iou(np.array([track.box for track in tracks]), box)
+    best = int(np.argmax(overlap))
+    return tracks.pop(best) if overlap[best] >= LEAST_OVERLAP else None

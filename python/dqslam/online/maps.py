@@ -137,7 +137,7 @@ def object_covariances(
         return {}
     state = _core.State(session.poses, session.ellipsoids[rows])
     objects = _core.covariance(graph, options, state).objects.reshape(-1, 9, 9)
-    known = np.isfinite(objects).all(axis=(1, 2))
+    known = [bool(np.isfinite(one).all()) for one in objects]
     return {
         row: one
         for row, one, good in zip(rows, objects, known, strict=True)

@@ -6,8 +6,6 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from dqslam._checks import Floats, Ints
 from dqslam.size_prior import SizePrior, SizePriors
 
@@ -39,6 +37,7 @@ class Registry:
     """Which row of the core an id has, and what is known of it beside its place."""
 
     def __init__(self, size_prior: SizePrior | SizePriors | None) -> None:
+        """Begin without objects."""
         self.ids: list[int] = []
         self.votes: list[Counter[str]] = []
         self.priors: list[SizePrior] = []
@@ -46,6 +45,7 @@ class Registry:
         self._size_prior = SizePrior() if size_prior is None else size_prior
 
     def __contains__(self, number: int) -> bool:
+        """Tell whether an object has this id."""
         return number in self._row
 
     def row_of(self, number: int) -> int:
@@ -60,7 +60,9 @@ class Registry:
         self, ids: Sequence[int], names: Sequence[str]
     ) -> tuple[list[int], list[tuple[int, SizePrior]]]:
         """Return the rows of ids, and the id and prior of those that are new; registers nothing."""
-        rows, new, found = [], [], {}
+        rows: list[int] = []
+        new: list[tuple[int, SizePrior]] = []
+        found: dict[int, int] = {}
         for number, name in zip(ids, names, strict=True):
             row = self._row.get(number)
             if row is None:
@@ -86,6 +88,4 @@ class Registry:
 
     def class_names(self) -> tuple[str, ...]:
         """Return the class of each object: the one most of its boxes have."""
-        return tuple(
-            votes.most_common(1)[0][0] if votes else "object" for votes in self.votes
-        )
+        return tuple(votes.most_common(1)[0][0] if votes else "object" for votes in self.votes)

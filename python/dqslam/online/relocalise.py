@@ -42,7 +42,9 @@ class Relocation:
             boxes,
             box=np.asarray(boxes.box)[known],
             object_id=self.object_id[known],
-            class_name=tuple(boxes.class_name[row] for row in rows) if boxes.class_name else (),
+            class_name=tuple(boxes.class_name[row] for row in rows.tolist())
+            if boxes.class_name
+            else (),
             truncated=None if boxes.truncated is None else np.asarray(boxes.truncated)[known],
         )
 

@@ -8,10 +8,10 @@ from concurrent.futures import Future
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from dqslam import _core
-from dqslam._checks import Floats, as_covariances
+from dqslam._checks import Floats, Ints, as_covariances
 from dqslam.estimate import Estimate
 from dqslam.online.identify import Identifier
 from dqslam.online.objects import Objects, Registry
@@ -27,6 +27,8 @@ from dqslam.online.step import (
 from dqslam.problem import BoxNoise
 from dqslam.recording import as_poses, pose_size, tangent_size
 from dqslam.size_prior import SizePrior, SizePriors
+
+Int32s = NDArray[np.int32]
 
 _NO_ROWS = np.zeros(0, dtype=np.int32)
 _NO_FLOATS = np.zeros(0)
@@ -94,6 +96,8 @@ class OnlineSlam:
             k = tangent_size(pose_model)
             covariance = np.asarray(first_covariance, dtype=np.float64)[None]
             self._first_covariance = as_covariances("first_covariance", covariance, 1, k)[0]
+        self.shown: Ints = np.zeros(0, dtype=np.int64)
+        """Object that each box of the last step was given, -1 for one that waits; shape (b,)."""
         self._pending: Future[Polished] | None = None
         self._map_rows = 0
         self._map_covariance: dict[int, Floats] = {}
@@ -130,13 +134,16 @@ class OnlineSlam:
         self._take_polished()
         count = len(self._timestamps)
         try:
+            tracks = None
             time = self._time(timestamp)
             checked = check_boxes(boxes)
             relative, covariance = self._motion(odometry)
+            shown = checked.object_id
             if checked.ids and min(checked.ids) < 0:
-                checked = self._identifier.identify(
+                shown, tracks = self._identifier.identify(
                     self._session, self._registry, checked, relative, self._box_noise
                 )
+                checked = checked.select(shown)
             rows, new = self._registry.rows(checked.ids, checked.class_name)
             report = self._session.add(
                 relative,
@@ -151,6 +158,9 @@ class OnlineSlam:
             )
         except (ValueError, TypeError) as error:
             raise StepError(f"step {count}: {error}") from None
+        if tracks is not None:
+            self._identifier.tracks = tracks
+        self.shown = shown
         self._registry.register(new)
         for row, name in zip(rows, checked.class_name, strict=True):
             self._registry.votes[row][name] += 1
@@ -194,7 +204,7 @@ class OnlineSlam:
                 rows[:, ::5] = self._box_noise.pixels**2
         return rows
 
-    def _position_rows(self, positions: StepPositions | None) -> tuple[object, Floats, Floats]:
+    def _position_rows(self, positions: StepPositions | None) -> tuple[Int32s, Floats, Floats]:
         if positions is None:
             return _NO_POSITIONS
         ids = np.asarray(positions.object_id).tolist()
@@ -215,8 +225,8 @@ class OnlineSlam:
     def pose(self) -> Floats:
         """world_from_robot now, shape (d,); the first pose before any step."""
         if not self._timestamps:
-            return self._first_pose
-        return self._session.pose_at(len(self._timestamps) - 1)
+            return np.asarray(self._first_pose)
+        return np.asarray(self._session.pose_at(len(self._timestamps) - 1))
 
     @property
     def trajectory(self) -> Floats:
@@ -227,6 +237,11 @@ class OnlineSlam:
     def timestamps(self) -> Floats:
         """Seconds, shape (n,)."""
         return np.array(self._timestamps)
+
+    @property
+    def count(self) -> int:
+        """How many objects there are."""
+        return int(self._session.num_objects)
 
     @property
     def objects(self) -> Objects:
@@ -269,9 +284,7 @@ class OnlineSlam:
         or boxes there is nothing to do.
         """
         self._take_polished(wait=True)
-        work = polish_session(
-            self._session, self.solve_options, keeps_map=self._map_rows > 0
-        )
+        work = polish_session(self._session, self.solve_options, keeps_map=self._map_rows > 0)
         started = self._pending = start_polish(work, background=background)
         self._take_polished(wait=not background)
         return started

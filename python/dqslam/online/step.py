@@ -71,6 +71,17 @@ class CheckedBoxes:
     truncated: NDArray[np.bool_]
     ids: list[int] = field(default_factory=list)
 
+    def select(self, object_id: NDArray[np.int64]) -> CheckedBoxes:
+        """Return the boxes that show an object, with these ids (b,); -1 for none."""
+        rows = np.flatnonzero(object_id >= 0)
+        return CheckedBoxes(
+            self.box[rows],
+            object_id[rows],
+            [self.class_name[row] for row in rows.tolist()],
+            self.truncated[rows],
+            object_id[rows].tolist(),
+        )
+
 
 _NO_BOXES = CheckedBoxes(
     np.zeros((0, 4)), np.zeros(0, dtype=np.int64), (), np.zeros((0, 4), dtype=np.bool_)
