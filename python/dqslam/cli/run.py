@@ -113,7 +113,6 @@ def run(
     report.json and config.toml.
     """
     from dqslam import _core, io, run_recording
-    from dqslam.online.run import describe_step, run_online
     from dqslam.size_prior import load_size_priors
 
     sizes = None if size_priors is None else load_size_priors(size_priors)
@@ -152,6 +151,8 @@ def run(
                 recording, added, seed=seed, believed=believed
             )
         if online:
+            from dqslam.online.run import describe_step, run_online
+
             result = run_online(
                 recording,
                 final_ids=final,
