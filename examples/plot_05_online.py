@@ -1,0 +1,71 @@
+"""
+Step by step, as it arrives
+===========================
+
+A robot wants to know where it is now. :class:`dqslam.OnlineSlam` takes odometry and boxes as they
+come, does bounded work for each step, and has an estimate at any time. What it knew then, what it
+makes of it when a round closes, and what a polish adds at the end.
+"""
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+import dqslam as dq
+
+scenario = dq.load_scenario("paper").model_copy(update={"objects": "ellipsoids"})
+recording, truth = dq.simulate(scenario, seed=4)
+
+# %%
+# The loop of a robot
+# -------------------
+# ``steps_of`` replays a recording: each step has a time, the motion since the last one, and boxes.
+# The pose that is known at once is kept, to be compared with the whole path at the end.
+
+slam = dq.OnlineSlam(recording.camera, box_noise=dq.BoxNoise(pixels=1.0, relative=0.0))
+now = []
+linearised = []
+for step in dq.steps_of(recording):
+    report = slam.add(step.odometry, step.boxes, timestamp=step.timestamp)
+    now.append(slam.pose)
+    linearised.append(report.linearized)
+now = np.array(now)
+last = slam.trajectory
+slam.polish()
+polished = slam.trajectory
+print(f"{len(slam)} steps, {len(slam.objects.ids)} objects")
+
+
+# %%
+# How well it knew, and when
+# --------------------------
+
+
+def error(path):
+    """Return the distance of each pose from its true place, metres."""
+    return np.linalg.norm(path[:, :2] - truth.poses[:, :2], axis=1)
+
+
+drift = dq.build_graph(recording).core.initial_poses
+figure, axes = plt.subplots(figsize=(8, 3.4), layout="constrained")
+for path, color, name in [
+    (drift, "#0072B2", "odometry"),
+    (now, "#E69F00", "at the time"),
+    (last, "#D55E00", "the path at the end"),
+    (polished, "#009E73", "polished"),
+]:
+    axes.plot(recording.timestamps, np.maximum(error(path), 1e-3), color=color, label=name)
+axes.set(xlabel="time [s]", ylabel="position error [m]", yscale="log", xlim=(0, None))
+axes.set_ylim(0.005, 20)
+axes.legend(frameon=False, ncols=4, loc="upper center", bbox_to_anchor=(0.5, 1.16))
+plt.show()
+
+# %%
+# What a step costs
+# -----------------
+# Boxes that were linearised: a few for the window of recent poses, more where objects of the first
+# round come back into view and the path behind them is moved.
+
+figure, axes = plt.subplots(figsize=(8, 2.8), layout="constrained")
+axes.semilogy(recording.timestamps, np.maximum(linearised, 1), ".", color="#0072B2")
+axes.set(xlabel="time [s]", ylabel="boxes linearised", xlim=(0, None))
+plt.show()
