@@ -39,7 +39,10 @@ myst_heading_anchors = 3
 # Every name in a signature is a link or is listed here: what other projects document.
 nitpicky = True
 nitpick_ignore_regex = [
-    ("py:.*", r"(numpy|np|pathlib|collections|typing|pydantic|typer|enum|matplotlib)\..*"),
+    (
+        "py:.*",
+        r"(numpy|np|pathlib|collections|concurrent|typing|pydantic|typer|enum|matplotlib)\..*",
+    ),
     ("py:.*", r"(Any|ArrayLike|NDArray|ndarray|float64|int64|bool|Align|Ids|TypeAliasForwardRef)"),
     ("py:.*", r"dict\[.*|dqslam\.experiment\.methods\.Settings|dqslam\.io\.results\.save\..*"),
     ("py:.*", r"dqslam\.(view\.scene|sweep|plot)\..*"),
