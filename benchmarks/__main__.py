@@ -9,15 +9,23 @@ import typer
 from rich.console import Console
 
 from benchmarks import compare, report
-from benchmarks.cases import ALL_PROGRAMS, CASES, DEFAULT_CASES, LINEARISE
+from benchmarks.cases import ALL_PROGRAMS, CASES, DEFAULT_CASES, LINEARISE, ONLINE
 from benchmarks.figure import plot_scaling, scaling_cases
 from benchmarks.linearise import PROGRAM, linearise
 from benchmarks.machine import describe
-from benchmarks.measure import ROOT, Command, dqslam_command, measure, scipy_command
+from benchmarks.measure import (
+    ROOT,
+    Command,
+    dqslam_command,
+    measure,
+    online_command,
+    scipy_command,
+)
 from benchmarks.peers import PeerMissingError, gtsam_command
 from benchmarks.results import Linearised, Measured, Results, load_results, save_results
 
 _WIDTH = 125  # of the tables, characters: in a file they are not squeezed
+_PROGRAMS = (*ALL_PROGRAMS, ONLINE)
 _HELP = f"Of {', '.join([*CASES, LINEARISE])}; by default {', '.join(DEFAULT_CASES)}."
 
 
@@ -33,8 +41,8 @@ def bench(
         typer.Option(min=1e-6, help="Factor on odometry's noise; default: the case's."),
     ] = None,
     programs: Annotated[
-        str, typer.Option(help="Separated by commas; dqslam, gtsam_quadrics, scipy.")
-    ] = ",".join(ALL_PROGRAMS),
+        str, typer.Option(help=f"Separated by commas; {', '.join(_PROGRAMS)}.")
+    ] = ",".join(_PROGRAMS),
     limit: Annotated[
         float, typer.Option(min=1.0, help="Seconds of a run; beyond, it fails.")
     ] = 600,
@@ -47,7 +55,7 @@ def bench(
     cases = cases or list(DEFAULT_CASES)
     _check("case", cases, [*CASES, LINEARISE])
     chosen = programs.split(",")
-    _check("program", chosen, ALL_PROGRAMS)
+    _check("program", chosen, _PROGRAMS)
     before = _baseline(baseline) if baseline else None
 
     skipped: dict[str, str] = {}
@@ -107,6 +115,8 @@ def _commands(chosen: list[str], skipped: dict[str, str]) -> dict[str, Command]:
                 commands[program] = gtsam_command(_say)
             except PeerMissingError as error:
                 skipped[program] = str(error)
+        elif program == ONLINE:
+            commands[program] = online_command()
         else:
             commands[program] = dqslam_command() if program == compare.DQSLAM else scipy_command()
     return commands

@@ -25,11 +25,14 @@ class Case:
 
 
 ALL_PROGRAMS = ("dqslam", "gtsam_quadrics", "scipy")
+ONLINE = "dqslam_online"
+"""Step by step, then polished."""
 CASES = {
     "paper": Case(paper, noise=1.0, programs=ALL_PROGRAMS),
     "peer-1": Case(partial(chain, 1, 10), noise=1.0, programs=ALL_PROGRAMS),
     "peer-9": Case(partial(chain, 9, 11), noise=0.1),
     "peer-84": Case(partial(chain, 84, 12), noise=0.02),
+    "online-5k": Case(partial(chain, 9, 11), noise=0.1, programs=("dqslam", ONLINE)),
     "million": Case(partial(chain, 356, 12), noise=0.01),
 }
 LINEARISE = "linearise"

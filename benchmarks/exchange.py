@@ -49,7 +49,7 @@ def write_answer(
     poses: np.ndarray,
     dual_quadrics: np.ndarray,
     stopwatch: Stopwatch,
-    **facts: "float | str | None",
+    **facts: "float | str | dict[str, float] | None",
 ) -> None:
     """Write what a program found, and what that took.
 

@@ -23,6 +23,11 @@ def dqslam_command() -> Command:
     return [sys.executable, "-m", "benchmarks.programs.run_dqslam"]
 
 
+def online_command() -> Command:
+    """Return what solves with dqslam step by step."""
+    return [sys.executable, "-m", "benchmarks.programs.run_online"]
+
+
 def scipy_command() -> Command:
     """Return what solves with scipy."""
     return [sys.executable, "-m", "benchmarks.programs.run_scipy"]

@@ -19,6 +19,8 @@ def tables(results: Results) -> Iterator["Table"]:
         yield speed_table(results)
         yield iteration_table(results)
         yield answer_table(results)
+        if any(run.step_ms for one in results.measured for run in one.runs):
+            yield step_table(results)
     if results.linearised:
         yield linearised_table(results.linearised)
 
@@ -60,6 +62,18 @@ def iteration_table(results: Results) -> "Table":
     for one in results.measured:
         if not one.failure:
             table.add_row(one.case, one.program, *_iterations(one))
+    return table
+
+
+def step_table(results: Results) -> "Table":
+    """Lay out what one step takes, of the programs that go step by step; medians of the runs."""
+    names = ("p50", "p99", "worst", "total")
+    table = _table("Steps: wall ms", "case", "program", *names)
+    for one in results.measured:
+        runs = [run.step_ms for run in one.runs if run.step_ms]
+        if runs:
+            values = (f"{median(run[name] for run in runs):.3g}" for name in names)
+            table.add_row(one.case, one.program, *values)
     return table
 
 

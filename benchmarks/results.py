@@ -51,6 +51,8 @@ class Run:
     """Likewise: residuals and Jacobians."""
     linear_solver_seconds: float | None = None
     """Likewise: normal equations, their factors and steps."""
+    step_ms: dict[str, float] = field(default_factory=dict)
+    """Wall clock of a step where the program goes step by step: p50, p99, worst, total."""
     score: Score | None = None
     failure: str = ""
     """Why there is no answer."""

@@ -5,8 +5,10 @@
 #include <stdexcept>
 
 #include "dqslam/dispatch.h"
+#include "dqslam/online/recover.h"
 #include "dqslam/online/region.h"
 #include "dqslam/online/start.h"
+#include "dqslam/online/to_graph.h"
 #include "dqslam/whitening.h"
 
 namespace dqslam::online {
@@ -14,87 +16,12 @@ namespace {
 
 constexpr double kFirstDamping = 1e-4;
 constexpr double kMostDamping = 1e-2;  // that a window takes over from the one before
-constexpr int kRecoverIterations = 10;
-// What a sight costs beside its tangent residual while its object is not in front.
-constexpr double kUndefinedCost = 50;
 // A young session minimises a lap whenever it has grown by this share, after so many steps.
 constexpr int kLapGrowth = 4, kSoonestLap = 16;
 // An object is started again when it has so many sights.
 constexpr int kTryAgainAt[] = {4, 8, 16, 32};
 // What lies before the window is linearised anew when it has grown by this share.
 constexpr double kGrowth = 1.25;
-
-[[noreturn]] void Fail(const std::string& table, Eigen::Index row, const std::string& what) {
-  throw std::invalid_argument(table + " row " + std::to_string(row) + ": " + what);
-}
-
-template <int n>
-Eigen::Matrix<double, n, n> Whitening(const std::string& table,
-                                      const RowMatrix& covariances,
-                                      Eigen::Index row) {
-  using Square = Eigen::Matrix<double, n, n, Eigen::RowMajor>;
-  try {
-    return SqrtInformation<n>(Eigen::Map<const Square>(covariances.row(row).data()));
-  } catch (const std::invalid_argument& error) {
-    Fail(table, row, error.what());
-  }
-}
-
-void CheckShape(const char* table, const RowMatrix& values, Eigen::Index rows, int columns) {
-  if (values.rows() == rows && (rows == 0 || values.cols() == columns)) return;
-  throw std::invalid_argument(std::string(table) + ": expected " + std::to_string(rows) +
-                              " rows of " + std::to_string(columns));
-}
-
-// Sights of a pose that is not there yet; new objects have rows from `objects` on.
-std::vector<Sight> CheckedSights(const NewSights& given, int pose, int objects) {
-  const Eigen::Index boxes = given.object.size(), positions = given.position_object.size();
-  CheckShape("boxes", given.box, boxes, kBoxSize);
-  CheckShape("box_covariance", given.covariance, boxes, 16);
-  CheckShape("positions", given.position, positions, 3);
-  CheckShape("position_covariance", given.position_covariance, positions, 9);
-  if (given.truncated.rows() != boxes || (boxes > 0 && given.truncated.cols() != kBoxSize)) {
-    throw std::invalid_argument("box_truncated: expected a row of 4 for each box");
-  }
-  const Eigen::Index born = given.log_size_mean.size();
-  for (Eigen::Index row = 0; row < born; ++row) {
-    if (!std::isfinite(given.log_size_mean[row]) || !(given.log_size_sigma[row] > 0)) {
-      Fail("log_size_sigma", row, "expected a finite mean and a positive sigma");
-    }
-  }
-  std::vector<bool> seen(born, false);
-  std::vector<Sight> sights;
-  for (Eigen::Index row = 0; row < boxes + positions; ++row) {
-    const bool is_box = row < boxes;
-    const Eigen::Index own = is_box ? row : row - boxes;
-    const char* table = is_box ? "boxes" : "positions";
-    Sight sight;
-    sight.pose = pose;
-    sight.object = is_box ? given.object[own] : given.position_object[own];
-    sight.is_box = is_box;
-    if (sight.object < 0 || sight.object >= objects + born) Fail(table, own, "no such object");
-    if (sight.object >= objects) seen[sight.object - objects] = true;
-    if (is_box) {
-      sight.value = given.box.row(own).transpose();
-      sight.sqrt_information = Whitening<4>("box_covariance", given.covariance, own);
-      sight.truncated = given.truncated.row(own);
-      if (sight.value[0] >= sight.value[2] || sight.value[1] >= sight.value[3]) {
-        Fail(table, own, "inverted or empty box");
-      }
-    } else {
-      sight.value << given.position.row(own).transpose(), 0;
-      sight.sqrt_information.setZero();
-      sight.sqrt_information.topLeftCorner<3, 3>() =
-          Whitening<3>("position_covariance", given.position_covariance, own);
-    }
-    if (!sight.value.allFinite()) Fail(table, own, "NaN or infinite number");
-    sights.push_back(sight);
-  }
-  for (Eigen::Index row = 0; row < born; ++row) {
-    if (!seen[row]) Fail("log_size_mean", row, "the new object is not seen");
-  }
-  return sights;
-}
 
 template <typename Pose>
 class SessionOf : public Session {
@@ -203,7 +130,9 @@ class SessionOf : public Session {
     }
   }
 
-  Graph ToGraph(std::vector<int>* rows) const override;
+  Graph ToGraph(std::vector<int>* rows) const override {
+    return online::ToGraph(model_, history_, rows);
+  }
 
   int num_poses() const override { return history_.num_poses(); }
   int num_objects() const override { return static_cast<int>(history_.objects.size()); }
@@ -284,7 +213,7 @@ class SessionOf : public Session {
     StepReport report;
     const int end = num_poses();
     report.pose = end - 1;
-    const int begin = std::max(end - options_.window_poses, history_.first_pose_is_known ? 1 : 0);
+    const int begin = std::max(end - options_.window_poses, FirstFree());
     if (begin >= end) return report;
     report.linearized = KeepPast(begin);
     damping_ = std::min(damping_, kMostDamping);
@@ -295,7 +224,7 @@ class SessionOf : public Session {
     report.linearized += window.linearized;
     report.undefined = window.undefined;
     report.chi_square = window.residuals > 0 ? window.chi_square / window.residuals : 0;
-    if (DoesNotFit(window)) Recover(&report);
+    if (DoesNotFit(window)) StartYoungAgain(&report);
     const int smooth_from = ChooseSmoothing(window, begin, &report);
     if (smooth_from < begin) {
       const int iterations =
@@ -305,63 +234,22 @@ class SessionOf : public Session {
     return report;
   }
 
+  int FirstFree() const { return history_.first_pose_is_known ? 1 : 0; }
+
   bool DoesNotFit(const Work& window) {
     return num_poses() >= next_recovery_ &&
            (window.undefined > 0 ||
             window.chi_square > options_.misfit_chi_square * window.residuals);
   }
 
-  // Boxes reject most places far from the right one, so that a window cannot leave a wrong one.
-  // The recent poses go back to their odometry and the young objects that they saw to their starts:
-  // the tangent residual leads from there to what the boxes then refine, as in Grow().
-  void Recover(StepReport* report) {
-    const int end = num_poses();
-    next_recovery_ = end + options_.recover_every;
-    const int begin = std::max(end - options_.recent_poses, history_.first_pose_is_known ? 1 : 0);
-    std::vector<int> objects;
-    for (int row = history_.SightsBefore(begin); row < static_cast<int>(history_.sights.size());
-         ++row) {
-      const int object = history_.sights[row].object;
-      const bool is_young = history_.objects[object].sights.front() >= history_.SightsBefore(begin);
-      if (is_young && history_.objects[object].map.H.isZero(0) &&
-          std::find(objects.begin(), objects.end(), object) == objects.end()) {
-        objects.push_back(object);
-      }
-    }
-    double damping = kFirstDamping;
-    double best = Cost(
-        region_.Minimize(&history_, begin, Past::kAnew, options_.smoothing_iterations, &damping));
-    for (const bool by_size : {false, true}) {
-      const std::vector<Storage> poses(history_.poses.begin() + begin, history_.poses.end());
-      std::vector<Vector9d> charts;
-      for (const Object& object : history_.objects) charts.push_back(object.chart);
-      for (int pose = std::max(begin, 1); pose < end; ++pose) {
-        Pose::Compose(history_.poses[pose - 1].data(),
-                      history_.steps[pose].relative.data(),
-                      history_.poses[pose].data());
-      }
-      for (const int row : objects) {
-        history_.objects[row].chart = StartAgain(model_, history_, history_.objects[row], by_size);
-      }
-      damping = kFirstDamping;
-      region_.Minimize(
-          &history_, begin, Past::kAnew, kRecoverIterations, &damping, Edges::kTangent);
-      const Work work =
-          region_.Minimize(&history_, begin, Past::kAnew, kRecoverIterations, &damping);
-      report->smoothed_sights += work.linearized;
-      if (Cost(work) < best) {
-        best = Cost(work);
-        continue;
-      }
-      std::copy(poses.begin(), poses.end(), history_.poses.begin() + begin);
-      for (int row = 0; row < num_objects(); ++row) history_.objects[row].chart = charts[row];
-    }
-    MarkStale(begin);
+  void StartYoungAgain(StepReport* report) {
+    next_recovery_ = num_poses() + options_.recover_every;
+    const int begin = std::max(num_poses() - options_.recent_poses, FirstFree());
+    report->smoothed_sights += Recover(model_, begin, options_, &region_, &history_);
+    report->smoothed_poses = num_poses() - begin;
     report->recovered = true;
-    report->smoothed_poses = end - begin;
+    MarkStale(begin);
   }
-
-  static double Cost(const Work& work) { return work.cost + kUndefinedCost * work.undefined; }
 
   // Objects in a wrong place are started again, and all is minimised once more.
   void SmoothFrom(int begin, int iterations, StepReport* report) {
@@ -446,87 +334,6 @@ class SessionOf : public Session {
   int next_recovery_ = 0;
   double loop_credit_ = 1;  // loops that may be closed now
 };
-
-template <typename Pose>
-Graph SessionOf<Pose>::ToGraph(std::vector<int>* rows) const {
-  constexpr int k = Pose::kTangentSize;
-  Graph graph;
-  graph.pose_model = Pose::kModel;
-  graph.camera = model_.camera;
-  graph.scene_priors = model_.scene;
-  graph.initial_poses.resize(num_poses(), Pose::kSize);
-  const int steps = std::max(num_poses() - 1, 0);
-  graph.odometry.from = IndexVector::LinSpaced(steps, 0, steps - 1);
-  graph.odometry.to = IndexVector::LinSpaced(steps, 1, steps);
-  graph.odometry.relative.resize(steps, Pose::kSize);
-  graph.odometry.covariance.resize(steps, k * k);
-  for (int pose = 0; pose < num_poses(); ++pose) {
-    const auto& step = history_.steps[pose];
-    Storage at = step.relative;
-    if (pose > 0) {
-      Pose::Compose(graph.initial_poses.row(pose - 1).data(), step.relative.data(), at.data());
-      Pose::Normalize(at.data());
-      graph.odometry.relative.row(pose - 1) = step.relative.transpose();
-      Eigen::Map<Eigen::Matrix<double, k, k, Eigen::RowMajor>>(
-          graph.odometry.covariance.row(pose - 1).data()) = step.covariance;
-    }
-    graph.initial_poses.row(pose) = at.transpose();
-  }
-  rows->clear();
-  std::vector<int> row_of_object(num_objects(), -1);
-  for (int object = 0; object < num_objects(); ++object) {
-    const std::vector<int>& own = history_.objects[object].sights;
-    const bool has_box = std::any_of(
-        own.begin(), own.end(), [this](int row) { return history_.sights[row].is_box; });
-    if (!has_box) continue;
-    row_of_object[object] = static_cast<int>(rows->size());
-    rows->push_back(object);
-  }
-  graph.size_prior.log_mean.resize(rows->size());
-  graph.size_prior.log_sigma.resize(rows->size());
-  for (size_t row = 0; row < rows->size(); ++row) {
-    graph.size_prior.log_mean[row] = history_.objects[(*rows)[row]].size.log_mean;
-    graph.size_prior.log_sigma[row] = history_.objects[(*rows)[row]].size.log_sigma;
-  }
-  const auto takes_part = [&](const Sight& sight) { return row_of_object[sight.object] >= 0; };
-  int boxes = 0, positions = 0;
-  for (const Sight& sight : history_.sights) {
-    if (takes_part(sight)) ++(sight.is_box ? boxes : positions);
-  }
-  graph.boxes = {IndexVector(boxes),
-                 IndexVector(boxes),
-                 RowMatrix(boxes, kBoxSize),
-                 RowMatrix(boxes, 16),
-                 BoolTable(boxes, kBoxSize)};
-  graph.positions = {IndexVector(positions),
-                     IndexVector(positions),
-                     RowMatrix(positions, 3),
-                     RowMatrix(positions, 9)};
-  boxes = positions = 0;
-  for (const Sight& sight : history_.sights) {
-    if (!takes_part(sight)) continue;
-    const int object = row_of_object[sight.object];
-    if (sight.is_box) {
-      const Eigen::Matrix4d& W = sight.sqrt_information;
-      const Eigen::Matrix4d covariance = (W.transpose() * W).inverse();
-      graph.boxes.pose[boxes] = sight.pose;
-      graph.boxes.object[boxes] = object;
-      graph.boxes.box.row(boxes) = sight.value.transpose();
-      graph.boxes.covariance.row(boxes) =
-          Eigen::Map<const Eigen::Matrix<double, 1, 16>>(covariance.data());
-      graph.boxes.truncated.row(boxes++) = sight.truncated.transpose();
-    } else {
-      const Eigen::Matrix3d W = sight.sqrt_information.topLeftCorner<3, 3>();
-      const Eigen::Matrix3d covariance = (W.transpose() * W).inverse();
-      graph.positions.pose[positions] = sight.pose;
-      graph.positions.object[positions] = object;
-      graph.positions.object_in_robot.row(positions) = sight.value.head<3>().transpose();
-      graph.positions.covariance.row(positions++) =
-          Eigen::Map<const Eigen::Matrix<double, 1, 9>>(covariance.data());
-    }
-  }
-  return graph;
-}
 
 }  // namespace
 

@@ -9,24 +9,10 @@
 #include <memory>
 
 #include "dqslam/graph.h"
-#include "dqslam/initialize.h"
-#include "dqslam/online/chart.h"
 #include "dqslam/online/options.h"
+#include "dqslam/online/sights.h"
 
 namespace dqslam::online {
-
-/// What one pose saw.  Objects are rows; those from the number of objects on are new, in order.
-struct NewSights {
-  IndexVector object;
-  RowMatrix box;         ///< (n, 4) undistorted pixels
-  RowMatrix covariance;  ///< (n, 16) pixels^2
-  BoolTable truncated;   ///< (n, 4)
-  IndexVector position_object;
-  RowMatrix position;             ///< (p, 3) object_in_robot, metres
-  RowMatrix position_covariance;  ///< (p, 9) metres^2
-  Eigen::VectorXd log_size_mean;  ///< of the new objects
-  Eigen::VectorXd log_size_sigma;
-};
 
 /// What a step cost.
 struct StepReport {
