@@ -84,13 +84,13 @@ class Chain {
   bool EliminateObject(int slot) {
     const int at = At(slot), behind = at + 9, size = k + 9 * used_;
     const Eigen::LLT<Matrix9d> cholesky(Matrix9d(front_.template block<9, 9>(at, at)));
-    if (cholesky.info() != Eigen::Success) return false;
+    const Vector9d h = cholesky.matrixL().solve(Vector9d(rhs_.template segment<9>(at)));
+    if (cholesky.info() != Eigen::Success || !h.allFinite()) return false;
     auto& panel = of_object_;
     panel.resize(size, 9);
     panel.topRows(at) = front_.block(at, 0, 9, at).transpose();
     panel.middleRows(at, 9).setZero();
     panel.bottomRows(size - behind) = front_.block(behind, at, size - behind, 9);
-    const Vector9d h = cholesky.matrixL().solve(Vector9d(rhs_.template segment<9>(at)));
     front_.block(at, 0, 9, size).setZero();
     front_.block(behind, at, size - behind, 9).setZero();
     rhs_.template segment<9>(at).setZero();
@@ -150,12 +150,12 @@ class Chain {
   bool EliminatePose(const Square* to_next) {
     const int m = 9 * used_;
     const Eigen::LLT<Square> cholesky(Square(front_.template topLeftCorner<k, k>()));
-    if (cholesky.info() != Eigen::Success) return false;
+    const Column h = cholesky.matrixL().solve(Column(rhs_.template head<k>()));
+    if (cholesky.info() != Eigen::Success || !h.allFinite()) return false;
     auto& panel = of_pose_;
     panel.resize(k + m, k);
     panel.template topRows<k>() = to_next ? Square(to_next->transpose()) : Square::Zero();
     panel.bottomRows(m) = front_.block(k, 0, m, k);
-    const Column h = cholesky.matrixL().solve(Column(rhs_.template head<k>()));
     front_.block(0, 0, k + m, k).setZero();
     rhs_.template head<k>().setZero();
     Downdate<k>(-1, cholesky, h, &panel);
