@@ -26,8 +26,8 @@ CLEAR = 6.0
 LEAST_OVERLAP = 0.3
 # Boxes of a tracklet before it becomes an object: a false alarm lasts no longer.
 BIRTH = 3
-# What the map and the motion of one step are believed to, besides what odometry says: sigmas of
-# centre [m], log shape and position. The window does not keep joint covariances.
+# How well the map is known, beside the motion of one step: sigmas of the centre [m] and of the
+# shape. The window does not keep joint covariances.
 _CENTER_SIGMA_M, _SHAPE_SIGMA = 0.1, 0.1
 _WRONG_CLASS = 0.02
 
@@ -57,13 +57,14 @@ class Identifier:
         registry: Registry,
         boxes: CheckedBoxes,
         relative: Floats,
+        motion_covariance: Floats,
         noise: BoxNoise,
     ) -> tuple[Ints, list[Track]]:
         """Return the object of each box (b,), -1 for one that waits, and what to follow next.
 
         Nothing changes until `tracks` is set: the step may yet be refused.
         """
-        chosen = self._by_map(session, registry, boxes, relative, noise)
+        chosen = self._by_map(session, registry, boxes, relative, motion_covariance, noise)
         taken = set(chosen[chosen >= 0].tolist())
         next_id = registry.next_id()
         waiting = list(self.tracks)
@@ -88,6 +89,7 @@ class Identifier:
         registry: Registry,
         boxes: CheckedBoxes,
         relative: Floats,
+        motion_covariance: Floats,
         noise: BoxNoise,
     ) -> Ints:
         """Return the object that each box clearly shows by the map, -1 for none; shape (b,)."""
@@ -108,9 +110,9 @@ class Identifier:
         k = 3 if self._pose_model == _core.PoseModel.SE2 else 6
         own = [_CENTER_SIGMA_M] * 3 + [_SHAPE_SIGMA] * 6
         sigma = np.concatenate([np.zeros(k), np.tile(own, len(near))])
-        predicted = predict_boxes(
-            self._camera, self._pose_model, pose, ellipsoids[near], np.diag(sigma**2)
-        )
+        joint = np.diag(sigma**2)
+        joint[:k, :k] = motion_covariance
+        predicted = predict_boxes(self._camera, self._pose_model, pose, ellipsoids[near], joint)
         shown = near[predicted.object_row]
         if not shown.size:
             return chosen

@@ -141,7 +141,12 @@ class OnlineSlam:
             shown = checked.object_id
             if checked.ids and min(checked.ids) < 0:
                 shown, tracks = self._identifier.identify(
-                    self._session, self._registry, checked, relative, self._box_noise
+                    self._session,
+                    self._registry,
+                    checked,
+                    relative,
+                    covariance,
+                    self._box_noise,
                 )
                 checked = checked.select(shown)
             rows, new = self._registry.rows(checked.ids, checked.class_name)
