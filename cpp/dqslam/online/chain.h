@@ -110,6 +110,9 @@ class Chain {
     return true;
   }
 
+  /// The most objects that the front had at a time.
+  int most_objects() const { return used_; }
+
   /// Steps in the reverse order of elimination: visit_pose(step) from the last to the first, and
   /// visit_object(name, step).
   template <typename VisitPose, typename VisitObject>

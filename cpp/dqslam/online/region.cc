@@ -79,6 +79,7 @@ Work Region<Pose>::Minimize(
     work.moved = true;
     if (before - after < kTolerance) break;
   }
+  work.front = chain_.most_objects();
   for (const Local& local : locals_) {
     local_of_object_[local.object] = -1;
     const bool misfit = local.sights >= kFewestSights && local.chi_square > kMisfit * local.sights;

@@ -12,6 +12,7 @@ namespace dqslam::online {
 /// What a minimisation did: work and result.
 struct Work {
   int poses = 0, objects = 0;
+  int front = 0;             ///< objects in the front of the elimination, at most
   int linearized = 0;        ///< sights, over all iterations, of older poses too
   int undefined = 0;         ///< sights whose objects are not in front
   double chi_square = 0;     ///< of steps and sights of the region, at the end

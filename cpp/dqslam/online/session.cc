@@ -16,6 +16,7 @@ namespace {
 
 constexpr double kFirstDamping = 1e-4;
 constexpr double kMostDamping = 1e-2;  // that a window takes over from the one before
+constexpr double kLapObjects = 40;     // in the front of a lap of full length, at most
 // A young session minimises a lap whenever it has grown by this share, after so many steps.
 constexpr int kLapGrowth = 4, kSoonestLap = 16;
 // An object is started again when it has so many sights.
@@ -81,6 +82,7 @@ class SessionOf : public Session {
     copy->history_ = history_;
     copy->damping_ = damping_;
     copy->next_lap_ = next_lap_;
+    copy->lap_objects_ = lap_objects_;
     copy->next_recovery_ = next_recovery_;
     copy->loop_begin_ = loop_begin_;
     copy->loop_until_ = loop_until_;
@@ -257,6 +259,7 @@ class SessionOf : public Session {
     for (int round = 0; round < 2; ++round) {
       const Work work = region_.Minimize(&history_, begin, Past::kAnew, iterations, &damping);
       MarkStale(begin);
+      if (work.poses > options_.recent_poses) lap_objects_ = work.front;
       report->smoothed_poses = work.poses;
       report->smoothed_sights += work.linearized;
       bool changed = false;
@@ -269,6 +272,13 @@ class SessionOf : public Session {
       }
       if (!changed) break;
     }
+  }
+
+  // Work is square in the objects: where there are many, a lap is shorter.
+  int LapPoses() const {
+    const double square = lap_objects_ * lap_objects_ / (kLapObjects * kLapObjects);
+    const int poses = static_cast<int>(options_.lap_poses / std::max(square, 1.0));
+    return std::max(poses, std::min(options_.recent_poses, options_.lap_poses));
   }
 
   // The first pose to minimise beside the window's; the window's begin for none.
@@ -285,7 +295,7 @@ class SessionOf : public Session {
     }
     if (end >= next_lap_) {
       next_lap_ = end + std::clamp(end / kLapGrowth, kSoonestLap, options_.lap_every);
-      return std::max(end - options_.lap_poses, 0);
+      return std::max(end - LapPoses(), 0);
     }
     if (end % options_.recent_every == 0) return std::max(end - options_.recent_poses, 0);
     return begin;
@@ -332,6 +342,7 @@ class SessionOf : public Session {
   int loop_until_ = -1;             // until when the window is watched for it
   int next_lap_ = kSoonestLap;
   int next_recovery_ = 0;
+  double lap_objects_ = 0;  // in the front of the last lap
   double loop_credit_ = 1;  // loops that may be closed now
 };
 
