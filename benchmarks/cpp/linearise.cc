@@ -6,9 +6,11 @@
 #include <random>
 #include <vector>
 
+#include "dqslam/costs/algebraic.h"
 #include "dqslam/costs/box.h"
 #include "dqslam/costs/odometry.h"
 #include "dqslam/costs/tangent.h"
+#include "dqslam/edges.h"
 
 namespace dqslam {
 namespace {
@@ -114,6 +116,67 @@ void TangentAutoDiff(benchmark::State& state) {
 }
 
 template <typename Pose>
+void AlgebraicAutoDiff(benchmark::State& state) {
+  LineariseBoxes<Pose>(state, [](const Camera& camera, const Eigen::Vector4d& box) {
+    return AlgebraicCost<Pose, EllipsoidModel>::Create(
+        Mount(camera), BoxLines(camera, box), kWeight, true);
+  });
+}
+
+/// The derivatives of edges.h with all that leads to them, whitened; `differentiate(surface, box,
+/// &error, &edges)`.
+template <typename Pose, typename Differentiate>
+void LineariseByHand(benchmark::State& state, const Differentiate& differentiate) {
+  const Situations<Pose> situations;
+  const Mount mount(situations.camera);
+  size_t i = 0;
+  for (auto _ : state) {
+    const Station station = Station::At<Pose>(situations.poses[i].data(), mount);
+    const Unpacked<EllipsoidModel> landmark(situations.landmarks[i].data());
+    const Surface<double> surface = ToCamera(station.camera, landmark.surface);
+    Eigen::Vector4d error;
+    EdgeDerivatives edges;
+    differentiate(situations.camera, surface, situations.boxes[i], &error, &edges);
+    Eigen::Matrix<double, kBoxSize, Pose::kTangentSize> by_pose;
+    Eigen::Matrix<double, kBoxSize, kLandmarkSize> by_landmark;
+    ByPoseAndLandmark<Pose>(edges, station, mount, landmark, &by_pose, &by_landmark);
+    by_pose = kWeight * by_pose;
+    by_landmark = kWeight * by_landmark;
+    benchmark::DoNotOptimize(error);
+    benchmark::DoNotOptimize(by_pose);
+    benchmark::DoNotOptimize(by_landmark);
+    benchmark::ClobberMemory();
+    if (++i == situations.boxes.size()) i = 0;
+  }
+}
+
+template <typename Pose>
+void BoxByHand(benchmark::State& state) {
+  LineariseByHand<Pose>(state,
+                        [](const Camera& camera,
+                           const Surface<double>& surface,
+                           const Eigen::Vector4d& box,
+                           Eigen::Vector4d* error,
+                           EdgeDerivatives* edges) {
+                          DifferentiateBox(surface, camera, error, edges);
+                          *error = kWeight * (*error - box);
+                        });
+}
+
+template <typename Pose>
+void TangentByHand(benchmark::State& state) {
+  LineariseByHand<Pose>(state,
+                        [](const Camera& camera,
+                           const Surface<double>& surface,
+                           const Eigen::Vector4d& box,
+                           Eigen::Vector4d* error,
+                           EdgeDerivatives* edges) {
+                          DifferentiateTangents(surface, camera, box, kDepth, error, edges);
+                          *error = kWeight * *error;
+                        });
+}
+
+template <typename Pose>
 void OdometryAutoDiff(benchmark::State& state) {
   const Situations<Pose> situations;
   using Square = Eigen::Matrix<double, Pose::kTangentSize, Pose::kTangentSize>;
@@ -127,6 +190,12 @@ void OdometryAutoDiff(benchmark::State& state) {
   });
 }
 
+BENCHMARK(BoxByHand<Se2>);
+BENCHMARK(BoxByHand<Se3>);
+BENCHMARK(TangentByHand<Se2>);
+BENCHMARK(TangentByHand<Se3>);
+BENCHMARK(AlgebraicAutoDiff<Se2>);
+BENCHMARK(AlgebraicAutoDiff<Se3>);
 BENCHMARK(BoxAutoDiff<Se2>);
 BENCHMARK(BoxAutoDiff<Se3>);
 BENCHMARK(TangentAutoDiff<Se2>);

@@ -63,6 +63,10 @@ void BindEnums(py::module_& m) {
       .value("GNC_TLS", Loss::kGncTls)
       .value("GNC_GM", Loss::kGncGm)
       .finalize();
+  py::native_enum<Backend>(m, "Backend", "enum.Enum", "Who carries out the steps.")
+      .value("NATIVE", Backend::kNative)
+      .value("CERES", Backend::kCeres)
+      .finalize();
   py::native_enum<Minimizer>(m, "Minimizer", "enum.Enum", "The minimiser of the last stage.")
       .value("LEVENBERG_MARQUARDT", Minimizer::kLevenbergMarquardt)
       .value("DOGLEG", Minimizer::kDogleg)
@@ -91,6 +95,10 @@ void BindOptions(py::module_& m) {
       .def_readwrite("algebraic_sigma",
                      &SolveOptions::algebraic_sigma,
                      "Of both algebraic residuals, in their own unit.")
+      .def_readwrite("backend",
+                     &SolveOptions::backend,
+                     "NATIVE: normal equations in blocks, boxes differentiated by hand; CERES: "
+                     "ceres::Solve on AutoDiff costs, slower, a second opinion.")
       .def_readwrite("minimizer", &SolveOptions::minimizer, "Of the last stage.")
       .def_readwrite("max_iterations", &SolveOptions::max_iterations, "Of each batch stage.")
       .def_readwrite("function_tolerance",
@@ -130,6 +138,14 @@ void BindSolution(py::module_& m) {
                     "Infinity norm at the start of the last stage.")
       .def_readonly("gradient_norm_end", &Summary::gradient_norm_end, "Likewise at its end.")
       .def_readonly("seconds", &Summary::seconds, "Wall clock, all stages.")
+      .def_readonly(
+          "start_seconds", &Summary::start_seconds, "Of these, until all objects had a start.")
+      .def_readonly("evaluation_seconds",
+                    &Summary::evaluation_seconds,
+                    "Of all stages: residuals and their derivatives.")
+      .def_readonly("linear_solver_seconds",
+                    &Summary::linear_solver_seconds,
+                    "Of all stages: orderings, factorisations and solutions.")
       .def_readonly("converged",
                     &Summary::converged,
                     "The last stage met a stopping test and accepted a step.")

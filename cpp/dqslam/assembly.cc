@@ -13,6 +13,7 @@
 #include "dqslam/costs/tangent.h"
 #include "dqslam/dispatch.h"
 #include "dqslam/manifolds.h"
+#include "dqslam/stage_layout.h"
 
 namespace dqslam {
 namespace {
@@ -83,7 +84,7 @@ class Assembler {
           MakeBoxCost<true>(row), nullptr, PoseAt(pose), LandmarkAt(object), &state_.switches[row]);
       return;
     }
-    ceres::LossFunction* loss = MakeLoss();
+    ceres::LossFunction* loss = MakeLoss(stage_.loss, options_).release();
     if (weight != 1) loss = new ceres::ScaledLoss(loss, weight, ceres::TAKE_OWNERSHIP);
     problem_.AddResidualBlock(MakeBoxCost<false>(row), loss, PoseAt(pose), LandmarkAt(object));
   }
@@ -102,47 +103,22 @@ class Assembler {
   ceres::CostFunction* MakeBoxCost(int row) {
     const Eigen::Vector4d observed = graph_.boxes.box.row(row);
     const Eigen::Matrix4d& weight = prepared_.box_sqrt_information[row];
-    const Residual residual = stage_.residual;
-    if (residual == Residual::kAlgebraic || residual == Residual::kAlgebraicNormalized) {
+    const BoxRole role = RoleOfBox(prepared_, options_, stage_, state_, row);
+    if (role.IsAlgebraic()) {
       const Eigen::Matrix4d algebraic_weight =
           Eigen::Matrix4d::Identity() / options_.algebraic_sigma;
       return Create<kSwitched, AlgebraicCost<Pose, Landmark>>(
           prepared_.mount,
           BoxLines(graph_.camera, observed),
           algebraic_weight,
-          residual == Residual::kAlgebraicNormalized);
+          role.residual == Residual::kAlgebraicNormalized);
     }
-    const Surface<double> surface =
-        ToCamera(LocateCamera<Pose>(PoseAt(graph_.boxes.pose[row]), prepared_.mount),
-                 Landmark::Unpack(LandmarkAt(graph_.boxes.object[row])));
-    const EdgeFlags one_sided = OneSidedEdges(prepared_, row, surface);
-    Eigen::Vector4d predicted;
-    if (residual == Residual::kBox && ProjectToBox(surface, graph_.camera, &predicted)) {
+    if (role.residual == Residual::kBox) {
       return Create<kSwitched, BoxCost<Pose, Landmark>>(
-          graph_.camera, prepared_.mount, observed, weight, one_sided);
+          graph_.camera, prepared_.mount, observed, weight, role.one_sided);
     }
-    // Never closer than the object is thick, so that an object behind the camera still has a scale.
-    const double thickness = std::sqrt(std::max(surface.shape(2, 2), 1e-12));
-    const double depth = std::max(surface.center.z(), 1.5 * thickness);
     return Create<kSwitched, TangentCost<Pose, Landmark>>(
-        graph_.camera, prepared_.mount, observed, weight, depth, one_sided);
-  }
-
-  ceres::LossFunction* MakeLoss() const {
-    switch (stage_.loss) {
-      case Loss::kHuber:
-        return new ceres::HuberLoss(options_.loss_scale);
-      case Loss::kCauchy:
-        return new ceres::CauchyLoss(options_.loss_scale);
-      case Loss::kDcs:
-        return new DcsLoss(options_.outlier_chi_square);
-      case Loss::kNone:
-      case Loss::kSwitchable:
-      case Loss::kGncTls:
-      case Loss::kGncGm:
-        break;
-    }
-    return nullptr;
+        graph_.camera, prepared_.mount, observed, weight, role.depth, role.one_sided);
   }
 
   void AddPositions(const std::vector<bool>& takes_part) {

@@ -157,6 +157,10 @@ void Append(const Summary& stage, Summary* total) {
   *total = stage;
   total->iterations += before.iterations;
   total->rejected_steps += before.rejected_steps;
+  total->seconds += before.seconds;
+  total->start_seconds += before.start_seconds;
+  total->evaluation_seconds += before.evaluation_seconds;
+  total->linear_solver_seconds += before.linear_solver_seconds;
   if (!before.message.empty()) total->initial_cost = before.initial_cost;
 }
 

@@ -89,8 +89,11 @@ struct Summary {
   double gradient_norm_start = 0;  ///< infinity norm, at the start of the last stage
   double gradient_norm_end = 0;    ///< likewise, at its end
   double seconds = 0;              ///< wall clock, all stages
-  bool converged = false;          ///< the last stage met a stopping test and accepted a step
-  std::string message;             ///< how it ended, in words
+  double start_seconds = 0;        ///< of these, until all objects had a start
+  double evaluation_seconds = 0;   ///< of all stages: residuals and their derivatives
+  double linear_solver_seconds = 0;  ///< of all stages: orderings, factorisations, solutions
+  bool converged = false;            ///< the last stage met a stopping test and accepted a step
+  std::string message;               ///< how it ended, in words
 };
 
 /// Makes `total` the summary of all stages so far: counts add up, the rest is the last stage's.

@@ -43,6 +43,12 @@ enum class Loss {
 
 enum class Minimizer { kLevenbergMarquardt, kDogleg };
 
+/// Who carries out the steps; the costs and the methods are the same.
+enum class Backend {
+  kNative,  ///< normal equations in blocks, boxes differentiated by hand
+  kCeres,   ///< ceres::Solve on AutoDiff cost functions: slower, a second opinion
+};
+
 struct SolveOptions {
   Mode mode = Mode::kSlam;
   Residual residual = Residual::kTangentThenBox;
@@ -50,9 +56,10 @@ struct SolveOptions {
   Start start = Start::kSphere;
   Schedule schedule = Schedule::kGrow;
   Loss loss = Loss::kNone;
-  double loss_scale = 2.0;                   ///< of Huber and Cauchy: sigmas of a whole box
-  double outlier_chi_square = 13.28;         ///< of the others: 99 % of chi-square with 4 dof
-  double algebraic_sigma = 1.0;              ///< of both algebraic residuals, their own unit
+  double loss_scale = 2.0;            ///< of Huber and Cauchy: sigmas of a whole box
+  double outlier_chi_square = 13.28;  ///< of the others: 99 % of chi-square with 4 dof
+  double algebraic_sigma = 1.0;       ///< of both algebraic residuals, their own unit
+  Backend backend = Backend::kNative;
   Minimizer minimizer = Minimizer::kDogleg;  ///< of the last stage
   int max_iterations = 300;                  ///< of each batch stage
   double function_tolerance = 1e-7;          ///< stop when |change of cost| / cost falls below

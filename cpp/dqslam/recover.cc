@@ -39,6 +39,14 @@ bool HasImpossibleSize(const PreparedGraph& prepared,
   return error.square().sum() > kImpossibleSize * std::pow(prior.log_sigma[object], 2);
 }
 
+// An object by itself: its boxes from poses that stay where they are.
+Stage StageOfObject(const PreparedGraph& prepared, const SolveOptions& options, int object) {
+  Stage stage = BatchStage(prepared, options);
+  stage.boxes = prepared.boxes_of_object[object];
+  stage.end_pose = stage.first_free_pose = prepared.graph.boxes.pose[stage.boxes.back()] + 1;
+  return stage;
+}
+
 }  // namespace
 
 std::vector<bool> StuckObjects(const PreparedGraph& prepared,
@@ -129,17 +137,26 @@ void TryOtherDepths(const PreparedGraph& prepared,
                     Summary* summary) {
   SolveOptions by_size = options;
   by_size.start = Start::kSizePrior;
+  State attempt = *state;
+  Summary total = *summary;
+  bool any = false;
   for (int object = 0; object < prepared.graph.num_objects(); ++object) {
     const std::vector<int>& boxes = prepared.boxes_of_object[object];
     const bool is_few = static_cast<int>(boxes.size()) <= kFewBoxes;
     if (!is_few && !HasImpossibleSize(prepared, options, *state, object)) continue;
-    State attempt = *state;
-    attempt.landmarks.row(object) = StartObject(prepared, by_size, attempt, object, boxes);
-    Summary total = *summary;
-    const Stage all = BatchStage(prepared, options);
-    Append(Optimize(prepared, options, all, monitor, &attempt), &total);
-    KeepIfBetter(attempt, total, state, summary);
+    const Stage alone = StageOfObject(prepared, options, object);
+    State moved = attempt;
+    moved.landmarks.row(object) = StartObject(prepared, by_size, moved, object, boxes);
+    const Summary there = Optimize(prepared, options, alone, monitor, &moved);
+    State stayed = attempt;
+    const Summary here = Optimize(prepared, options, alone, monitor, &stayed);
+    if (!(there.final_cost < here.final_cost)) continue;
+    attempt.landmarks.row(object) = moved.landmarks.row(object);
+    any = true;
   }
+  if (!any) return;
+  Append(Optimize(prepared, options, BatchStage(prepared, options), monitor, &attempt), &total);
+  KeepIfBetter(attempt, total, state, summary);
 }
 
 }  // namespace dqslam

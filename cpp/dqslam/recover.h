@@ -18,8 +18,8 @@ std::vector<bool> StuckObjects(const PreparedGraph& prepared,
 bool IsTorn(const PreparedGraph& prepared, const State& state);
 
 /// Objects of few boxes have several minima, in depth above all: starts each of them, and those
-/// whose size the prior excludes, at the depth of the prior size as well, minimises all, and keeps
-/// what lowers the cost.
+/// whose size the prior excludes, at the depth of the prior size as well, by itself.  What lowers
+/// its own cost there is tried on the whole, and kept if it lowers that too.
 void TryOtherDepths(const PreparedGraph& prepared,
                     const SolveOptions& options,
                     const Monitor& monitor,

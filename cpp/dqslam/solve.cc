@@ -80,7 +80,10 @@ class Solver {
       state->poses = start->poses;
       state->landmarks = start->landmarks;
     } else {
+      const auto begin = std::chrono::steady_clock::now();
       summary = ReachStart(state);
+      const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - begin;
+      summary.start_seconds = elapsed.count();
     }
     if (ThrowsBoxesOut(options_.loss)) {
       Append(Batch(BatchStage(prepared_, options_).residual, Loss::kCauchy, state), &summary);

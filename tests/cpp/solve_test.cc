@@ -335,7 +335,8 @@ TEST_F(SolveTest, SaysThatEveryStepWasRejected) {
   EXPECT_EQ(solution.landmarks, start.landmarks);
   EXPECT_EQ(summary.rejected_steps, 1);
   EXPECT_FALSE(summary.converged);
-  EXPECT_THAT(summary.message, testing::StartsWith("every step was rejected: Maximum number"));
+  EXPECT_THAT(summary.message,
+              testing::StartsWith("every step was rejected: stopped after 1 iteration"));
   EXPECT_EQ(summary.final_cost, summary.initial_cost);
 }
 

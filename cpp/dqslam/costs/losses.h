@@ -5,7 +5,10 @@
 
 #include <ceres/loss_function.h>
 
+#include <memory>
+
 #include "dqslam/costs/cost.h"
+#include "dqslam/options.h"
 
 namespace dqslam {
 
@@ -30,6 +33,25 @@ class DcsLoss : public ceres::LossFunction {
  private:
   double phi_;
 };
+
+/// The loss function of a stage; null for the plain sum of squares, which switchable constraints
+/// and graduated non-convexity weight themselves.
+inline std::unique_ptr<ceres::LossFunction> MakeLoss(Loss loss, const SolveOptions& options) {
+  switch (loss) {
+    case Loss::kHuber:
+      return std::make_unique<ceres::HuberLoss>(options.loss_scale);
+    case Loss::kCauchy:
+      return std::make_unique<ceres::CauchyLoss>(options.loss_scale);
+    case Loss::kDcs:
+      return std::make_unique<DcsLoss>(options.outlier_chi_square);
+    case Loss::kNone:
+    case Loss::kSwitchable:
+    case Loss::kGncTls:
+    case Loss::kGncGm:
+      break;
+  }
+  return nullptr;
+}
 
 /// Switchable constraints, Suenderhauf & Protzel 2012:  r = (w e, (1 - w) sqrt(phi)).
 /// Blocks: those of the box cost, and the switch [1].  Residual: [5].  Fails where the box cost
