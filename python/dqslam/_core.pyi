@@ -12,6 +12,7 @@ import numpy
 import numpy.typing
 
 __all__: list[str] = [
+    "Backend",
     "Camera",
     "Covariance",
     "Fit",
@@ -333,6 +334,14 @@ class Loss(enum.Enum):
     NONE = 0
     SWITCHABLE = 4
 
+class Backend(enum.Enum):
+    """
+    Who carries out the steps.
+    """
+
+    CERES = 1
+    NATIVE = 0
+
 class Minimizer(enum.Enum):
     """
     The minimiser of the last stage.
@@ -363,6 +372,13 @@ class SolveOptions:
         """
     @algebraic_sigma.setter
     def algebraic_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def backend(self) -> Backend:
+        """
+        NATIVE: normal equations in blocks, boxes differentiated by hand; CERES: ceres::Solve on AutoDiff costs, slower, a second opinion.
+        """
+    @backend.setter
+    def backend(self, arg0: Backend) -> None: ...
     @property
     def function_tolerance(self) -> float:
         """
@@ -468,6 +484,11 @@ class Summary:
         The last stage met a stopping test and accepted a step.
         """
     @property
+    def evaluation_seconds(self) -> float:
+        """
+        Of all stages: residuals and their derivatives.
+        """
+    @property
     def final_cost(self) -> float:
         """
         Likewise.
@@ -493,6 +514,11 @@ class Summary:
         Of all stages.
         """
     @property
+    def linear_solver_seconds(self) -> float:
+        """
+        Of all stages: orderings, factorisations and solutions.
+        """
+    @property
     def message(self) -> str:
         """
         How it ended, in words.
@@ -506,6 +532,11 @@ class Summary:
     def seconds(self) -> float:
         """
         Wall clock, all stages.
+        """
+    @property
+    def start_seconds(self) -> float:
+        """
+        Of these, until all objects had a start.
         """
 
 class Solution:
