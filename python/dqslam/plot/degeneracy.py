@@ -68,7 +68,7 @@ def _draw_errors(axes: "Axes", table: DegeneracyTable) -> None:
             label=f"{estimator}, {start} start",
         )
     axes.set_yscale("log")
-    axes.set_ylim(top=1e5)  # what is further off is lost, however far
+    axes.set_ylim(top=1e8)  # what is further off is lost, however far
     axes.set_xticks(range(len(names)), [name.replace(", ", ",\n") for name in names])
     axes.set_ylabel("error of the object's centre [m]")
     axes.set_title(f"Median and quartiles of {table.trials} objects, poses known", fontsize=10)
