@@ -3,9 +3,16 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 namespace dqslam {
+
+double TangentDepth(const Surface<double>& in_camera) {
+  const double thickness = std::sqrt(std::max(in_camera.shape(2, 2), 1e-12));
+  return std::max(in_camera.center.z(), 1.5 * thickness);
+}
 
 Eigen::Matrix<double, 4, 2> TouchingPoints(const Surface<double>& in_camera,
                                            const Camera& camera,
@@ -24,6 +31,19 @@ Eigen::Matrix<double, 4, 2> TouchingPoints(const Surface<double>& in_camera,
         camera.fy * pole.y() / pole.z() + camera.cy;
   }
   return points;
+}
+
+EdgeFlags OneSidedEdges(const EdgeFlags& truncated,
+                        const Camera& camera,
+                        const Surface<double>& in_camera,
+                        const Eigen::Vector4d& predicted) {
+  EdgeFlags one_sided = truncated;
+  if (!one_sided.any()) return one_sided;
+  const Eigen::Matrix<double, 4, 2> points = TouchingPoints(in_camera, camera, predicted);
+  for (int edge = 0; edge < kBoxSize; ++edge) {
+    one_sided[edge] = one_sided[edge] || !camera.Shows(points(edge, 0), points(edge, 1));
+  }
+  return one_sided;
 }
 
 Vector9d DualQuadricFromSurface(const Surface<double>& surface) {

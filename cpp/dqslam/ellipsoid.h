@@ -126,11 +126,23 @@ bool TangentDistances(const Surface<T>& in_camera,
   return true;
 }
 
+/// The depth for TangentDistances [m]: that of the centre, but never closer than the object is
+/// thick, so that an object behind the camera still has a scale.
+double TangentDepth(const Surface<double>& in_camera);
+
 /// Where the outline touches its bounding box at each edge [px], (u, v) one a row: the pole of the
 /// edge's line.  The box is that of ProjectToBox.
 Eigen::Matrix<double, 4, 2> TouchingPoints(const Surface<double>& in_camera,
                                            const Camera& camera,
                                            const Eigen::Vector4d& box);
+
+/// Edges of a box that only bound the object: those that the image border cut and, on boxes with
+/// such an edge, those that `in_camera` touches outside the image, where the detector could not see
+/// it.  The box `predicted` is that of ProjectToBox.
+EdgeFlags OneSidedEdges(const EdgeFlags& truncated,
+                        const Camera& camera,
+                        const Surface<double>& in_camera,
+                        const Eigen::Vector4d& predicted);
 
 /// An edge that the image border cut says only that the object goes on beyond: its error counts
 /// where the prediction ends inside, and is zero otherwise.  Errors are predicted - observed.

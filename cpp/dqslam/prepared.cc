@@ -53,16 +53,11 @@ PreparedGraph::PreparedGraph(const Graph& graph, bool poses_known)
 }
 
 EdgeFlags OneSidedEdges(const PreparedGraph& prepared, int box, const Surface<double>& in_camera) {
-  EdgeFlags one_sided = prepared.graph.boxes.truncated.row(box);
-  if (!one_sided.any()) return one_sided;
+  const EdgeFlags truncated = prepared.graph.boxes.truncated.row(box);
   const Camera& camera = prepared.graph.camera;
   Eigen::Vector4d predicted;
-  if (!ProjectToBox(in_camera, camera, &predicted)) return one_sided;
-  const Eigen::Matrix<double, 4, 2> points = TouchingPoints(in_camera, camera, predicted);
-  for (int edge = 0; edge < kBoxSize; ++edge) {
-    one_sided[edge] = one_sided[edge] || !camera.Shows(points(edge, 0), points(edge, 1));
-  }
-  return one_sided;
+  if (!ProjectToBox(in_camera, camera, &predicted)) return truncated;
+  return OneSidedEdges(truncated, camera, in_camera, predicted);
 }
 
 CameraInWorld<double> LocateCamera(const PreparedGraph& prepared, const State& state, int pose) {

@@ -21,9 +21,8 @@ struct PreparedGraph {
   std::vector<int> odometry_into;                 ///< row that leads to each pose; -1: none
 };
 
-/// Edges of a box that only bound the object: those that the image border cut and, on boxes with
-/// such an edge, those that `in_camera` touches outside the image, where the detector could not see
-/// it.
+/// Those of a box of the graph, see ellipsoid.h; where its object is not strictly in front, the
+/// edges that the image border cut.
 EdgeFlags OneSidedEdges(const PreparedGraph& prepared, int box, const Surface<double>& in_camera);
 
 /// Where the camera stands at a pose of the state.

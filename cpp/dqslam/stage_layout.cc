@@ -1,7 +1,6 @@
 #include "dqslam/stage_layout.h"
 
 #include <algorithm>
-#include <cmath>
 
 namespace dqslam {
 namespace {
@@ -91,9 +90,7 @@ BoxRole RoleOfBox(const PreparedGraph& prepared,
     return role;
   }
   role.residual = Residual::kTangent;
-  // Never closer than the object is thick, so that an object behind the camera still has a scale.
-  const double thickness = std::sqrt(std::max(surface.shape(2, 2), 1e-12));
-  role.depth = std::max(surface.center.z(), 1.5 * thickness);
+  role.depth = TangentDepth(surface);
   return role;
 }
 

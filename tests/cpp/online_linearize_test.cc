@@ -56,14 +56,14 @@ void ExpectDerivatives(double distance, bool is_box, bool truncated) {
     sight.sqrt_information = Eigen::Matrix4d::Identity() +
                              0.3 * Eigen::Matrix4d::NullaryExpr([&] { return normal(random); });
     if (truncated) sight.truncated << true, false, true, false;
-    const auto stand = [&](const typename History<Pose>::Storage& at) {
-      return StandAt<Pose>(model, at.data());
+    const auto station = [&](const typename History<Pose>::Storage& at) {
+      return Station::At<Pose>(at.data(), model.mount);
     };
     Linear<Pose> linear;
-    Linearize<Pose>(model, stand(pose), sight, chart, Edges::kBox, &linear);
+    Linearize<Pose>(model, station(pose), sight, chart, Edges::kBox, &linear);
     double unused;
     EXPECT_NEAR(linear.cost,
-                CostOfSight(model, stand(pose), sight, chart, linear.depth, &unused),
+                CostOfSight(model, station(pose), sight, chart, linear.depth, &unused),
                 1e-9 * (1 + linear.cost));
     EXPECT_EQ(linear.depth > 0, is_box && distance < 2);
     const Eigen::VectorXd by_pose = linear.by_pose.transpose() * linear.residual;
@@ -75,16 +75,17 @@ void ExpectDerivatives(double distance, bool is_box, bool truncated) {
         tangent[i] = side == 0 ? -kStep : kStep;
         typename History<Pose>::Storage moved;
         Plus<Pose>(pose.data(), tangent.data(), moved.data());
-        cost[side] = CostOfSight(model, stand(moved), sight, chart, linear.depth, &unused);
+        cost[side] = CostOfSight(model, station(moved), sight, chart, linear.depth, &unused);
       }
       EXPECT_NEAR(by_pose[i], (cost[1] - cost[0]) / (2 * kStep), 1e-4 * (1 + by_pose.norm()));
     }
     const Vector9d by_object = linear.by_object.transpose() * linear.residual;
     for (int i = 0; i < 9; ++i) {
       const Vector9d d = kStep * Vector9d::Unit(i);
-      const double ahead = CostOfSight(model, stand(pose), sight, chart + d, linear.depth, &unused);
+      const double ahead =
+          CostOfSight(model, station(pose), sight, chart + d, linear.depth, &unused);
       const double behind =
-          CostOfSight(model, stand(pose), sight, chart - d, linear.depth, &unused);
+          CostOfSight(model, station(pose), sight, chart - d, linear.depth, &unused);
       EXPECT_NEAR(by_object[i], (ahead - behind) / (2 * kStep), 1e-4 * (1 + by_object.norm()));
     }
   }
@@ -130,7 +131,8 @@ TEST(Linearize, IsTheBoxCost) {
   Eigen::Vector4d expected;
   ASSERT_TRUE(cost(pose.data(), ellipsoid.data(), expected.data()));
   Linear<Se3> linear;
-  Linearize<Se3>(model, StandAt<Se3>(model, pose.data()), sight, chart, Edges::kBox, &linear);
+  const Station station = Station::At<Se3>(pose.data(), model.mount);
+  Linearize<Se3>(model, station, sight, chart, Edges::kBox, &linear);
   EXPECT_LT((linear.residual - expected).norm(), 1e-9);
 }
 
@@ -145,9 +147,9 @@ TEST(Linearize, WeighsByTheCauchyLoss) {
   sight.sqrt_information.setIdentity();
   sight.truncated.setConstant(false);
   Linear<Se2> all, weighed;
-  const Stand stand = StandAt<Se2>(plain, pose.data());
-  Linearize<Se2>(plain, stand, sight, chart, Edges::kBox, &all);
-  Linearize<Se2>(robust, stand, sight, chart, Edges::kBox, &weighed);
+  const Station station = Station::At<Se2>(pose.data(), plain.mount);
+  Linearize<Se2>(plain, station, sight, chart, Edges::kBox, &all);
+  Linearize<Se2>(robust, station, sight, chart, Edges::kBox, &weighed);
   const double s = all.residual.squaredNorm();
   EXPECT_NEAR(weighed.cost, 0.5 * 4 * std::log1p(s / 4), 1e-9);
   const Vector9d expected = all.by_object.transpose() * all.residual / (1 + s / 4);

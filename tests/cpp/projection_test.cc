@@ -154,6 +154,13 @@ TEST(TangentDistances, FailWithoutARealSurface) {
                                 &distances));
 }
 
+TEST(TangentDepth, IsThatOfTheCentreButNeverLessThanTheObjectIsThick) {
+  const Eigen::Matrix3d shape = Eigen::Vector3d(1, 1, 0.04).asDiagonal();
+  EXPECT_DOUBLE_EQ(TangentDepth({{1, 2, 5}, shape}), 5);
+  EXPECT_DOUBLE_EQ(TangentDepth({{1, 2, 0.1}, shape}), 0.3);
+  EXPECT_DOUBLE_EQ(TangentDepth({{1, 2, -3}, shape}), 0.3);
+}
+
 TEST(StrictlyInFront, ByHand) {
   const auto ball_at = [](double x, double y, double z) {
     return Surface<double>{{x, y, z}, Eigen::Matrix3d::Identity()};
@@ -208,6 +215,20 @@ TEST(TouchingPoints, AgreeWithTheSampledSurface) {
         oracle::ExtremePixels(camera, oracle::Viewpoint(), e);
     EXPECT_LT((TouchingPoints(surface, camera, box) - expected).norm(), 1e-3);  // flat there
   }
+}
+
+// A sphere that the image's right border (u = 640) cuts: its outline ends at u = 763.
+TEST(OneSidedEdges, AreThoseCutAndThoseTouchedOutsideTheImage) {
+  const Camera camera = MakeCamera();
+  const Surface<double> sphere{{0.7, 0, 2}, 0.25 * Eigen::Matrix3d::Identity()};
+  Eigen::Vector4d box;
+  ASSERT_TRUE(ProjectToBox(sphere, camera, &box));
+  EXPECT_NEAR(box[2], 763, 1);
+  const EdgeFlags none = EdgeFlags::Constant(false);
+  EXPECT_FALSE(OneSidedEdges(none, camera, sphere, box).any());
+  EdgeFlags top = none, top_and_right = none;
+  top[1] = top_and_right[1] = top_and_right[2] = true;
+  EXPECT_TRUE((OneSidedEdges(top, camera, sphere, box) == top_and_right).all());
 }
 
 TEST(IgnoreBeyond, KeepsOnlyWhatEndsInside) {

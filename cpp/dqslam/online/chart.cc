@@ -1,7 +1,6 @@
 #include "dqslam/online/chart.h"
 
-#include <ceres/jet.h>
-
+#include "dqslam/costs/autodiff.h"
 #include "dqslam/manifolds.h"
 
 namespace dqslam::online {
@@ -9,15 +8,11 @@ namespace {
 
 // d log-Cholesky / d chart.
 Matrix9d JacobianOfEllipsoid(const Vector9d& chart, Vector9d* ellipsoid) {
-  using Jet = ceres::Jet<double, 9>;
-  Jet in[9], out[9];
-  for (int i = 0; i < 9; ++i) in[i] = Jet(chart[i], i);
+  ceres::Jet<double, 9> in[9], out[9];
+  PlainJets<9>(chart.data(), 0, in);
   EllipsoidFromChart(in, out);
   Matrix9d jacobian;
-  for (int i = 0; i < 9; ++i) {
-    jacobian.row(i) = out[i].v.transpose();
-    (*ellipsoid)[i] = out[i].a;
-  }
+  SplitJets(out, ellipsoid, &jacobian);
   return jacobian;
 }
 

@@ -1,16 +1,11 @@
 // Residuals and their derivatives by the tangent of the pose and the chart of the object.
 //
-// An edge x of the outline in the camera frame, with n = (1, 0, -x) (or (0, 1, -y)), fulfils
-// n.S n = (n.p)^2, p and S in the camera frame.  Differentiated:
-//   dx = ((n.p) n.dp - n.dS n / 2) / e,   e = D x - B = +-sqrt(B^2 - A D)  (see ProjectToBox)
-// With v = S n, all in the robot frame, and q the centre there:
-//   by the centre a n;  by S  b n n^T;  by the pose's translation  -a n;  by its rotation
-//   -a q x n - 2 b v x n;  with a = (n.p) / e and b = -1 / (2 e).
-// Where the object is not strictly in front, the tangent residual takes the place of the box's, see
-// costs/tangent.h: n.p + |L^T n| with the n of the observed edge, hence a = +-1, b = 1 / (2 |L^T
-// n|).
+// The edges' own are in edges.h; here they go on to the chart, in which the derivative of n^T S n
+// is the products of n's entries.  Where the object is not strictly in front, the tangent residual
+// takes the place of the box's, see costs/tangent.h.
 #pragma once
 
+#include "dqslam/edges.h"
 #include "dqslam/graph.h"
 #include "dqslam/online/history.h"
 
@@ -26,17 +21,6 @@ struct Model {
   double loss_scale;  ///< of the Cauchy loss, sigmas of a whole box; 0 for least squares
 };
 
-/// A pose, ready for all that was seen from it.
-struct Stand {
-  Rigid<double> world_from_robot;
-  CameraInWorld<double> camera;
-};
-
-template <typename Pose>
-Stand StandAt(const Model& model, const double* pose) {
-  return {Pose::WorldFromRobot(pose), LocateCamera<Pose>(pose, model.mount)};
-}
-
 template <typename Pose>
 struct Linear {
   Eigen::Vector4d residual;
@@ -46,20 +30,10 @@ struct Linear {
   double depth;  ///< of the tangent residual [m], 0 where it is the box's
 };
 
-/// Takes the components of a tangent of SE(3) that the pose model has.
-template <typename Pose, typename Row>
-void SetTangent(const Eigen::Vector3d& translation, const Eigen::Vector3d& rotation, Row&& row) {
-  if constexpr (Pose::kModel == PoseModel::kSe2) {
-    row << translation.x(), translation.y(), rotation.z();
-  } else {
-    row << translation.transpose(), rotation.transpose();
-  }
-}
-
 /// Cost of a sight after the loss, and its chi-square before; with the residual that Linearize()
 /// used, of that depth.  Infinite where it is the box's and the object is not strictly in front.
 double CostOfSight(const Model& model,
-                   const Stand& stand,
+                   const Station& station,
                    const Sight& sight,
                    const Vector9d& chart,
                    double depth,
@@ -71,7 +45,7 @@ enum class Edges { kBox, kTangent };
 /// The residual with derivatives.
 template <typename Pose>
 void Linearize(const Model& model,
-               const Stand& stand,
+               const Station& station,
                const Sight& sight,
                const Vector9d& chart,
                Edges edges,

@@ -44,8 +44,8 @@ void AddPast(const Model& model,
   const Vector9d d = object.chart - past->origin;
   for (int i = first; i < last; ++i) {
     const Sight& sight = history.sights[object.sights[i]];
-    const Stand stand = StandAt<Pose>(model, history.poses[sight.pose].data());
-    Linearize<Pose>(model, stand, sight, object.chart, Edges::kBox, &linear);
+    const Station station = Station::At<Pose>(history.poses[sight.pose].data(), model.mount);
+    Linearize<Pose>(model, station, sight, object.chart, Edges::kBox, &linear);
     const Matrix9d H = linear.by_object.transpose() * linear.by_object;
     past->H += H;
     past->g += linear.by_object.transpose() * linear.residual - H * d;
@@ -157,7 +157,7 @@ double Region<Pose>::LinearizePose(const History<Pose>& history, int pose, Work*
     chain_.AddPose(jacobian * jacobian.transpose(), jacobian * residual);
     cost += 0.5 * residual * residual;
   }
-  const Stand stand = StandAt<Pose>(model_, at);
+  const Station station = Station::At<Pose>(at, model_.mount);
   const int first = history.SightsBefore(begin_);
   Linear<Pose> linear;
   for (int row = history.SightsBefore(pose); row < history.SightsBefore(pose + 1); ++row) {
@@ -173,7 +173,7 @@ double Region<Pose>::LinearizePose(const History<Pose>& history, int pose, Work*
       chain_.AddObjectInformation(local.slot, sum.H, sum.g);
     }
     ++work->linearized;
-    Linearize<Pose>(model_, stand, sight, object.chart, edges_, &linear);
+    Linearize<Pose>(model_, station, sight, object.chart, edges_, &linear);
     depth_[row - first] = linear.depth;
     work->undefined += linear.depth > 0;
     cost += linear.cost;
@@ -241,12 +241,13 @@ double Region<Pose>::TrialCost(const History<Pose>& history, Work* work) {
       Eigen::Matrix<double, k, 1> unused;
       cost += 0.5 * std::pow(LinearizeHeight<Pose>(model_, at, &unused), 2);
     }
-    const Stand stand = StandAt<Pose>(model_, at);
+    const Station station = Station::At<Pose>(at, model_.mount);
     for (int row = history.SightsBefore(pose); row < history.SightsBefore(pose + 1); ++row) {
       const Sight& sight = history.sights[row];
       Local& local = locals_[local_of_object_[sight.object]];
       double chi_square;
-      measured += CostOfSight(model_, stand, sight, local.trial, depth_[row - first], &chi_square);
+      measured +=
+          CostOfSight(model_, station, sight, local.trial, depth_[row - first], &chi_square);
       if (!std::isfinite(chi_square)) return chi_square;
       local.chi_square += chi_square;
       ++local.sights;

@@ -156,12 +156,12 @@ class Search {
   }
 
   // The sight of a match, with the map's uncertainty as a part of its noise.
-  Sight Blurred(const Stand& stand, const Match& match) const {
+  Sight Blurred(const Station& station, const Match& match) const {
     Sight sight = sights_[match.first];
     Linear<Pose> linear;
     Sight bare = sight;
     bare.sqrt_information.setIdentity();
-    Linearize<Pose>(model_, stand, bare, charts_[match.second], Edges::kBox, &linear);
+    Linearize<Pose>(model_, station, bare, charts_[match.second], Edges::kBox, &linear);
     const Eigen::Matrix4d total = noise_[match.first] + linear.by_object * spread_[match.second] *
                                                             linear.by_object.transpose();
     const Eigen::LLT<Eigen::Matrix4d> cholesky(total);
@@ -174,11 +174,11 @@ class Search {
     double damping = 1e-3;
     std::vector<Sight> sights;
     for (int iteration = 0; iteration < kIterations; ++iteration) {
-      const Stand stand = StandAt<Pose>(model_, place->pose.data());
+      const Station station = Station::At<Pose>(place->pose.data(), model_.mount);
       // Their noise depends on the pose: that of the start, and of the middle.
       if (iteration == 0 || iteration == kIterations / 2) {
         sights.clear();
-        for (const Match& match : place->matches) sights.push_back(Blurred(stand, match));
+        for (const Match& match : place->matches) sights.push_back(Blurred(station, match));
       }
       Square H = Square::Zero();
       Eigen::Matrix<double, Pose::kTangentSize, 1> g;
@@ -188,7 +188,7 @@ class Search {
       for (size_t i = 0; i < sights.size(); ++i) {
         Linear<Pose> linear;
         const Vector9d& chart = charts_[place->matches[i].second];
-        Linearize<Pose>(model_, stand, sights[i], chart, Edges::kBox, &linear);
+        Linearize<Pose>(model_, station, sights[i], chart, Edges::kBox, &linear);
         H += linear.by_pose.transpose() * linear.by_pose;
         g += linear.by_pose.transpose() * linear.residual;
         cost += linear.cost;
@@ -218,24 +218,24 @@ class Search {
                 const Place& place,
                 const std::vector<Sight>& sights,
                 const std::vector<double>& depths) const {
-    const Stand stand = StandAt<Pose>(model_, pose.data());
+    const Station station = Station::At<Pose>(pose.data(), model_.mount);
     double cost = 0, unused;
     for (size_t i = 0; i < sights.size(); ++i) {
       cost += CostOfSight(
-          model_, stand, sights[i], charts_[place.matches[i].second], depths[i], &unused);
+          model_, station, sights[i], charts_[place.matches[i].second], depths[i], &unused);
     }
     return std::isfinite(cost) ? cost : std::numeric_limits<double>::infinity();
   }
 
   // Each box to the object that it fits best, the best pairs first.
   std::vector<Match> Assign(const Storage& pose) const {
-    const Stand stand = StandAt<Pose>(model_, pose.data());
+    const Station station = Station::At<Pose>(pose.data(), model_.mount);
     std::vector<std::pair<double, Match>> pairs;
     for (size_t box = 0; box < sights_.size(); ++box) {
       for (const int object : view_.candidates[box]) {
         const Match match(box, object);
         double chi_square;
-        CostOfSight(model_, stand, Blurred(stand, match), charts_[object], 0, &chi_square);
+        CostOfSight(model_, station, Blurred(station, match), charts_[object], 0, &chi_square);
         if (chi_square <= kGate) pairs.push_back({chi_square, match});
       }
     }

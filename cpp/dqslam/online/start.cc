@@ -17,8 +17,8 @@ std::vector<View> ViewsOf(const Model& model, const History<Pose>& history, cons
   for (const int row : object.sights) {
     const Sight& sight = history.sights[row];
     if (!sight.is_box) continue;
-    const Stand stand = StandAt<Pose>(model, history.poses[sight.pose].data());
-    views.push_back({stand.camera, sight.value, sight.sqrt_information, sight.truncated});
+    const Station station = Station::At<Pose>(history.poses[sight.pose].data(), model.mount);
+    views.push_back({station.camera, sight.value, sight.sqrt_information, sight.truncated});
   }
   return views;
 }
@@ -36,8 +36,8 @@ double LinearizeAt(const Model& model,
   Linear<Pose> linear;
   for (const int row : object.sights) {
     const Sight& sight = history.sights[row];
-    const Stand stand = StandAt<Pose>(model, history.poses[sight.pose].data());
-    Linearize<Pose>(model, stand, sight, chart, Edges::kBox, &linear);
+    const Station station = Station::At<Pose>(history.poses[sight.pose].data(), model.mount);
+    Linearize<Pose>(model, station, sight, chart, Edges::kBox, &linear);
     sum->H.noalias() += linear.by_object.transpose() * linear.by_object;
     sum->g += linear.by_object.transpose() * linear.residual;
     cost += linear.cost;
@@ -55,8 +55,8 @@ double CostAt(const Model& model,
   double cost = CostOfPriors(model, object, chart), unused;
   for (size_t i = 0; i < object.sights.size(); ++i) {
     const Sight& sight = history.sights[object.sights[i]];
-    const Stand stand = StandAt<Pose>(model, history.poses[sight.pose].data());
-    cost += CostOfSight(model, stand, sight, chart, depths[i], &unused);
+    const Station station = Station::At<Pose>(history.poses[sight.pose].data(), model.mount);
+    cost += CostOfSight(model, station, sight, chart, depths[i], &unused);
   }
   return cost;
 }
@@ -99,13 +99,13 @@ double Settle(const Model& model,
 template <typename Pose>
 Vector9d Birth(const Model& model, const History<Pose>& history, const Object& object) {
   const Sight& sight = history.sights[object.sights.front()];
-  const Stand stand = StandAt<Pose>(model, history.poses[sight.pose].data());
+  const Station station = Station::At<Pose>(history.poses[sight.pose].data(), model.mount);
   if (!sight.is_box) {
-    const Rigid<double>& robot = stand.world_from_robot;
+    const Rigid<double>& robot = station.world_from_robot;
     const Eigen::Vector3d center = robot.rotation * sight.value.head<3>() + robot.translation;
     return ChartFromEllipsoid(Sphere(center, std::exp(object.size.log_mean)));
   }
-  const View view{stand.camera, sight.value, sight.sqrt_information, sight.truncated};
+  const View view{station.camera, sight.value, sight.sqrt_information, sight.truncated};
   return ChartFromEllipsoid(BackProject(model.camera, {view}, object.size));
 }
 
