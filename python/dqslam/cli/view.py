@@ -54,7 +54,7 @@ def view(
 ) -> None:
     """Show the map of DIR on a page: trajectory, cameras, objects, boxes, truth; Ctrl-C stops.
 
-    Needs `pip install 'dqslam[view]'`; --export and --ply do without, --rerun needs dqslam[rerun].
+    Needs the extra `view`; --export and --ply do without, --rerun needs the extra `rerun`.
     """
     from dqslam import io
     from dqslam._colors import ESTIMATE
