@@ -1,6 +1,7 @@
 """Files of sweeps into cells."""
 
 import re
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -10,35 +11,15 @@ from dqslam import _core, load_scenario
 from dqslam.io.files import FileError
 from dqslam.sweep import load_sweep
 from dqslam.sweep import trial as trial_module
+from small_sweep import ROTATION, SMALL, sweep_file
 
 PAPER = load_scenario("paper")
-ROTATION = "scenario.odometry.rotation_sigma_rad"
 EDGE = "scenario.detector.edge_sigma_px"
-
-# A quick drive: half the way, few objects.
-SMALL = """\
-scenario = "paper"
-trials = 3
-seed = 5
-
-[fixed]
-scenario.path.laps = 1
-scenario.world.object_count = 4
-
-[grid]
-scenario.odometry.rotation_sigma_rad = [0.01, 0.02]
-"estimator.loss" = ["none", "cauchy"]
-"""
 
 
 @pytest.fixture
 def write(tmp_path):
-    def write_file(text, name="sweep.toml"):
-        path = tmp_path / name
-        path.write_text(text)
-        return path
-
-    return write_file
+    return partial(sweep_file, tmp_path)
 
 
 def test_cells_are_the_grid_with_its_last_setting_fastest(write):

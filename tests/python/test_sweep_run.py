@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 
 import pytest
 
@@ -19,33 +20,12 @@ from dqslam.sweep import run as run_module
 from dqslam.sweep import trial as trial_module
 from dqslam.sweep.store import Store
 from dqslam.sweep.trial import cell_key
-
-ROTATION = "scenario.odometry.rotation_sigma_rad"
-
-# A quick drive: half the way, few objects.
-SMALL = """\
-scenario = "paper"
-trials = 3
-seed = 5
-
-[fixed]
-scenario.path.laps = 1
-scenario.world.object_count = 4
-
-[grid]
-scenario.odometry.rotation_sigma_rad = [0.01, 0.02]
-"estimator.loss" = ["none", "cauchy"]
-"""
+from small_sweep import ROTATION, SMALL, sweep_file
 
 
 @pytest.fixture
 def write(tmp_path):
-    def write_file(text, name="sweep.toml"):
-        path = tmp_path / name
-        path.write_text(text)
-        return path
-
-    return write_file
+    return partial(sweep_file, tmp_path)
 
 
 def rows_of(folder):

@@ -46,3 +46,19 @@ Scheduler = Annotated[
         help="Of the cluster: tcp://host:8786 of dask, or of ray. Default: one on this machine.",
     ),
 ]
+
+# Of commands that look at results, with the truth where there is any.
+TruthFile = Annotated[
+    Path | None,
+    typer.Option(
+        help="True trajectory, in any world. Default: groundtruth.txt in DIR or beside it."
+    ),
+]
+TrueObjectsFile = Annotated[
+    Path | None,
+    typer.Option(help="CSV of true objects. Default: objects.csv beside groundtruth.txt."),
+]
+Alignment = Annotated[
+    Literal["se3", "sim3", "se2", "none"],
+    typer.Option(help="Motion between both worlds: rigid, with scale, on the plane."),
+]

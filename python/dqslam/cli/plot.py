@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from dqslam.cli.found import results_in, truth_of
-from dqslam.cli.options import FrameRate, FrameTimesFile
+from dqslam.cli.options import Alignment, FrameRate, FrameTimesFile, TrueObjectsFile, TruthFile
 from dqslam.cli.output import Json, Output, Quiet
 from dqslam.cli.results import results_directory
 
@@ -33,20 +33,9 @@ def plot(
     kind: Annotated[
         Literal["svg", "png", "pdf"], typer.Option("--format", help="File format of the figures.")
     ] = "svg",
-    groundtruth: Annotated[
-        Path | None,
-        typer.Option(
-            help="True trajectory, in any world. Default: groundtruth.txt in DIR or beside it."
-        ),
-    ] = None,
-    objects: Annotated[
-        Path | None,
-        typer.Option(help="CSV of true objects. Default: objects.csv beside groundtruth.txt."),
-    ] = None,
-    align: Annotated[
-        Literal["se3", "sim3", "se2", "none"],
-        typer.Option(help="Motion between both worlds: rigid, with scale, on the plane."),
-    ] = "se3",
+    groundtruth: TruthFile = None,
+    objects: TrueObjectsFile = None,
+    align: Alignment = "se3",
     images: Annotated[
         Path | None,
         typer.Option(

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from dqslam.cli.found import results_in, truth_of
+from dqslam.cli.options import Alignment, TrueObjectsFile, TruthFile
 from dqslam.cli.output import Json, Output, Quiet
 
 if TYPE_CHECKING:
@@ -19,20 +20,9 @@ def view(
         Path,
         typer.Argument(metavar="DIR", help="What `dqslam run` wrote, or `dqslam simulate` before."),
     ],
-    groundtruth: Annotated[
-        Path | None,
-        typer.Option(
-            help="True trajectory, in any world. Default: groundtruth.txt in DIR or beside it."
-        ),
-    ] = None,
-    objects: Annotated[
-        Path | None,
-        typer.Option(help="CSV of true objects. Default: objects.csv beside groundtruth.txt."),
-    ] = None,
-    align: Annotated[
-        Literal["se3", "sim3", "se2", "none"],
-        typer.Option(help="Motion between both worlds: rigid, with scale, on the plane."),
-    ] = "se3",
+    groundtruth: TruthFile = None,
+    objects: TrueObjectsFile = None,
+    align: Alignment = "se3",
     export: Annotated[
         Path | None,
         typer.Option(metavar="PAGE", help="Write a folder that any web server shows, and stop."),

@@ -66,8 +66,8 @@ def method_options(settings: Settings, algebraic_sigma: float | None = None) -> 
         start=_core.Start.IDENTITY,
         schedule=_core.Schedule.BATCH,
         loss=_core.Loss.NONE,
-        # Ceres' dog-leg creeps where ours leaps, which from odometry alone reaches more drives; it is
-        # never worse than Levenberg-Marquardt here, and faster.
+        # Ceres' dog-leg creeps where ours leaps, which from odometry alone reaches more drives; it
+        # is never worse than Levenberg-Marquardt here, and faster.
         backend=_core.Backend.CERES,
         minimizer=_core.Minimizer.DOGLEG,
         algebraic_sigma=algebraic_sigma,
