@@ -11,6 +11,7 @@ using namespace pybind11::literals;
 namespace dqslam {
 namespace {
 
+using online::NewLabels;
 using online::NewSights;
 using online::OnlineOptions;
 using online::Session;
@@ -58,6 +59,9 @@ void BindOptions(py::module_& m) {
 void BindReport(py::module_& m) {
   py::class_<StepReport>(m, "StepReport", "What a step cost.")
       .def_readonly("pose", &StepReport::pose, "Row of the new pose.")
+      .def_readonly("first_sight",
+                    &StepReport::first_sight,
+                    "Row of the first it saw: boxes as they were given, then positions.")
       .def_readonly("window_poses", &StepReport::window_poses, "Poses of the window.")
       .def_readonly("window_objects", &StepReport::window_objects, "Objects that it saw.")
       .def_readonly("linearized",
@@ -123,8 +127,33 @@ void BindSession(py::module_& m) {
           "log_size_mean"_a,
           "log_size_sigma"_a,
           "Add a pose and what it saw: covariance (k, k), boxes (n, 4) with covariances (n, 16), "
-          "positions (p, 3) with covariances (p, 9), size priors of the new objects. The first "
-          "pose's relative is the pose itself, exact if its covariance is empty.")
+          "positions (p, 3) with covariances (p, 9), size priors of the new objects. A box of "
+          "object -1 waits and takes no part. The first pose's relative is the pose itself, exact "
+          "if its covariance is empty.")
+      .def(
+          "relabel",
+          [](Session& session,
+             const IndexVector& sight,
+             const IndexVector& object,
+             const RowMatrix& ellipsoid,
+             const Eigen::VectorXd& log_size_mean,
+             const Eigen::VectorXd& log_size_sigma) {
+            const py::gil_scoped_release no_gil;
+            session.Relabel(NewLabels{sight, object, ellipsoid, log_size_mean, log_size_sigma});
+          },
+          "sight"_a,
+          "object"_a,
+          "ellipsoid"_a = RowMatrix(0, kLandmarkSize),
+          "log_size_mean"_a = Eigen::VectorXd(),
+          "log_size_sigma"_a = Eigen::VectorXd(),
+          "Give boxes (n,), by the rows of their sights, to other objects (n,): -1 waits, "
+          "num_objects "
+          "+ i is a new object that starts from ellipsoid (m, 9), log-Cholesky, in the world.")
+      .def("scale_odometry",
+           &Session::ScaleOdometry,
+           "translation"_a,
+           "rotation"_a,
+           "Multiply the standard deviations of all steps, but not of the first pose.")
       .def(
           "add_map_object",
           [](Session& session,
@@ -141,12 +170,13 @@ void BindSession(py::module_& m) {
           "Add an object of a known map, and the covariance of its parameters, (9, 9).")
       .def(
           "smooth",
-          [](Session& session, int iterations) {
+          [](Session& session, int iterations, int begin) {
             const py::gil_scoped_release no_gil;
-            return session.Smooth(iterations);
+            return session.Smooth(iterations, begin);
           },
           "iterations"_a,
-          "Minimise all poses, the map's priors included; returns the cost.")
+          "begin"_a = 0,
+          "Minimise the poses from begin on, the map's priors included; returns the cost.")
       .def("merge",
            &Session::Merge,
            "poses"_a,
@@ -164,6 +194,7 @@ void BindSession(py::module_& m) {
       .def_property_readonly("num_poses", &Session::num_poses)
       .def_property_readonly("num_objects", &Session::num_objects)
       .def("pose_at", &Session::PoseAt, "row"_a, "Shape (d,).")
+      .def("poses_at", &Session::PosesAt, "rows"_a, "Shape (n, d).")
       .def_property_readonly("poses", &Session::Poses, "Shape (n, d).")
       .def_property_readonly("ellipsoids", &Session::Ellipsoids, "Shape (o, 9).")
       .def_property_readonly("observations", &Session::Observations, "Boxes per object, (o,).");

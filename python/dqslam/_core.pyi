@@ -770,6 +770,11 @@ class StepReport:
     @property
     def closed_loop(self) -> bool: ...
     @property
+    def first_sight(self) -> int:
+        """
+        Row of the first it saw: boxes as they were given, then positions.
+        """
+    @property
     def linearized(self) -> int:
         """
         Sights, in the window and to keep what lies before it.
@@ -836,7 +841,7 @@ class Session:
         log_size_sigma: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     ) -> StepReport:
         """
-        Add a pose and what it saw: covariance (k, k), boxes (n, 4) with covariances (n, 16), positions (p, 3) with covariances (p, 9), size priors of the new objects. The first pose's relative is the pose itself, exact if its covariance is empty.
+        Add a pose and what it saw: covariance (k, k), boxes (n, 4) with covariances (n, 16), positions (p, 3) with covariances (p, 9), size priors of the new objects. A box of object -1 waits and takes no part. The first pose's relative is the pose itself, exact if its covariance is empty.
         """
     def add_map_object(
         self,
@@ -866,9 +871,38 @@ class Session:
         """
         Shape (d,).
         """
-    def smooth(self, iterations: typing.SupportsInt | typing.SupportsIndex) -> float:
+    def poses_at(
+        self, rows: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"]
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
         """
-        Minimise all poses, the map's priors included; returns the cost.
+        Shape (n, d).
+        """
+    def relabel(
+        self,
+        sight: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
+        object: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
+        ellipsoid: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"] = ...,
+        log_size_mean: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] = ...,
+        log_size_sigma: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] = ...,
+    ) -> None:
+        """
+        Give boxes (n,), by the rows of their sights, to other objects (n,): -1 waits, num_objects + i is a new object that starts from ellipsoid (m, 9), log-Cholesky, in the world.
+        """
+    def scale_odometry(
+        self,
+        translation: typing.SupportsFloat | typing.SupportsIndex,
+        rotation: typing.SupportsFloat | typing.SupportsIndex,
+    ) -> None:
+        """
+        Multiply the standard deviations of all steps, but not of the first pose.
+        """
+    def smooth(
+        self,
+        iterations: typing.SupportsInt | typing.SupportsIndex,
+        begin: typing.SupportsInt | typing.SupportsIndex = 0,
+    ) -> float:
+        """
+        Minimise the poses from begin on, the map's priors included; returns the cost.
         """
     def to_graph(self) -> tuple[Graph, list[int]]:
         """

@@ -11,11 +11,14 @@ namespace dqslam::online {
 
 /// What one image, or one depth measurement, says of one object.
 struct Sight {
-  int pose, object;
+  int pose;
+  int object;                        ///< -1 for a box that waits: it takes no part
   Eigen::Vector4d value;             ///< box [px], or the centre in the robot frame [m] and a zero
   Eigen::Matrix4d sqrt_information;  ///< whitens the error; of a centre, zero in the last row
   EdgeFlags truncated = EdgeFlags::Constant(false);
   bool is_box = true;
+
+  bool Waits() const { return object < 0; }
 };
 
 /// A Gaussian in the chart: cost g.d + d.H d / 2 at a distance d from `origin`.
@@ -26,7 +29,7 @@ struct Quadratic {
 };
 
 struct Object {
-  Vector9d chart = Vector9d::Zero();
+  Vector9d chart = Vector9d::Zero();  ///< zero until it has a place
   SizePrior size;
   Quadratic map;            ///< of a map that was loaded; H = 0 without
   std::vector<int> sights;  ///< rows, ascending

@@ -22,6 +22,7 @@ std::vector<int> YoungObjects(const History<Pose>& history, int begin) {
   std::vector<int> young;
   const int first = history.SightsBefore(begin);
   for (int row = first; row < static_cast<int>(history.sights.size()); ++row) {
+    if (history.sights[row].Waits()) continue;
     const Object& object = history.objects[history.sights[row].object];
     const bool is_first = object.sights.front() == row;
     if (is_first && object.map.H.isZero(0)) young.push_back(history.sights[row].object);

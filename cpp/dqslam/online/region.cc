@@ -96,6 +96,7 @@ void Region<Pose>::Collect(History<Pose>* history, int begin, Past past, Work* w
   const int last = static_cast<int>(history->sights.size());
   for (int row = first; row < last; ++row) {
     const Sight& sight = history->sights[row];
+    if (sight.Waits()) continue;
     int& local = local_of_object_[sight.object];
     if (local < 0) {
       local = static_cast<int>(locals_.size());
@@ -162,6 +163,7 @@ double Region<Pose>::LinearizePose(const History<Pose>& history, int pose, Work*
   Linear<Pose> linear;
   for (int row = history.SightsBefore(pose); row < history.SightsBefore(pose + 1); ++row) {
     const Sight& sight = history.sights[row];
+    if (sight.Waits()) continue;
     Local& local = locals_[local_of_object_[sight.object]];
     const Object& object = history.objects[sight.object];
     if (local.slot < 0) {
@@ -244,6 +246,7 @@ double Region<Pose>::TrialCost(const History<Pose>& history, Work* work) {
     const Station station = Station::At<Pose>(at, model_.mount);
     for (int row = history.SightsBefore(pose); row < history.SightsBefore(pose + 1); ++row) {
       const Sight& sight = history.sights[row];
+      if (sight.Waits()) continue;
       Local& local = locals_[local_of_object_[sight.object]];
       double chi_square;
       measured +=

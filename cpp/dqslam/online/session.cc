@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "dqslam/dispatch.h"
+#include "dqslam/online/checks.h"
 #include "dqslam/online/recover.h"
 #include "dqslam/online/region.h"
 #include "dqslam/online/start.h"
@@ -23,6 +24,7 @@ constexpr int kLapGrowth = 4, kSoonestLap = 16;
 constexpr int kTryAgainAt[] = {4, 8, 16, 32};
 // What lies before the window is linearised anew when it has grown by this share.
 constexpr double kGrowth = 1.25;
+constexpr int kSettleIterations = 6;
 
 template <typename Pose>
 class SessionOf : public Session {
@@ -39,7 +41,8 @@ class SessionOf : public Session {
                  const NewSights& given) override {
     const int pose = num_poses(), objects = num_objects();
     const bool first_is_known = pose == 0 && covariance.size() == 0;
-    const typename History<Pose>::Step step = CheckedStep(relative, covariance, first_is_known);
+    const typename History<Pose>::Step step =
+        CheckedStep<Pose>(relative, covariance, first_is_known);
     const std::vector<Sight> sights = CheckedSights(given, pose, objects);
 
     // From here on nothing throws but for want of memory.
@@ -86,14 +89,46 @@ class SessionOf : public Session {
     copy->next_recovery_ = next_recovery_;
     copy->loop_begin_ = loop_begin_;
     copy->loop_until_ = loop_until_;
+    copy->loop_misfits_ = loop_misfits_;
     copy->loop_credit_ = loop_credit_;
     return copy;
   }
 
-  double Smooth(int iterations) override {
+  void Relabel(const NewLabels& labels) override {
+    CheckLabels(labels, history_);
+    for (const Relabelled& changed : online::Relabel(labels, &history_)) {
+      const Object& object = history_.objects[changed.object];
+      if (object.sights.empty()) continue;
+      const int seen = history_.sights[object.sights.back()].pose;
+      if (seen < num_poses() - options_.recent_poses) continue;
+      if (CloseLoop(changed.last, changed.back)) loop_misfits_ = loop_misfits_ || Misfits(object);
+    }
+  }
+
+  void ScaleOdometry(double translation, double rotation) override {
+    for (const double factor : {translation, rotation}) {
+      if (!std::isfinite(factor) || !(factor > 0)) {
+        throw std::invalid_argument("odometry: expected positive, finite factors");
+      }
+    }
+    Eigen::Matrix<double, Pose::kTangentSize, 1> factor;
+    factor.setConstant(translation);
+    // Tangents are (x, y | theta) in the plane, (x, y, z | rotation vector) in space.
+    factor.template tail<Pose::kTangentSize / 2>().setConstant(rotation);
+    for (int pose = 1; pose < num_poses(); ++pose) {
+      auto& step = history_.steps[pose];
+      step.covariance = factor.asDiagonal() * step.covariance * factor.asDiagonal();
+      step.sqrt_information = step.sqrt_information * factor.cwiseInverse().asDiagonal();
+    }
+  }
+
+  double Smooth(int iterations, int begin) override {
+    if (begin < 0 || begin > num_poses()) {
+      throw std::invalid_argument("begin: there is no pose " + std::to_string(begin));
+    }
     double damping = kFirstDamping;
-    const Work work = region_.Minimize(&history_, 0, Past::kAnew, iterations, &damping);
-    MarkStale(0);
+    const Work work = region_.Minimize(&history_, begin, Past::kAnew, iterations, &damping);
+    MarkStale(begin);
     return work.cost;
   }
 
@@ -144,6 +179,17 @@ class SessionOf : public Session {
     for (int row = 0; row < num_poses(); ++row) table.row(row) = history_.poses[row].transpose();
     return table;
   }
+  RowMatrix PosesAt(const IndexVector& rows) const override {
+    RowMatrix table(rows.size(), Pose::kSize);
+    for (Eigen::Index i = 0; i < rows.size(); ++i) {
+      if (rows[i] < 0 || rows[i] >= num_poses()) {
+        throw std::out_of_range("row " + std::to_string(i) + ": there is no pose " +
+                                std::to_string(rows[i]));
+      }
+      table.row(i) = history_.poses[rows[i]].transpose();
+    }
+    return table;
+  }
   RowMatrix Ellipsoids() const override {
     RowMatrix table(num_objects(), kLandmarkSize);
     for (int row = 0; row < num_objects(); ++row) {
@@ -153,55 +199,22 @@ class SessionOf : public Session {
   }
   IndexVector Observations() const override {
     IndexVector counts = IndexVector::Zero(num_objects());
-    for (const Sight& sight : history_.sights) counts[sight.object] += sight.is_box;
+    for (const Sight& sight : history_.sights) {
+      if (!sight.Waits()) counts[sight.object] += sight.is_box;
+    }
     return counts;
   }
 
  private:
-  typename History<Pose>::Step CheckedStep(const Eigen::VectorXd& relative,
-                                           const RowMatrix& covariance,
-                                           bool first_is_known) const {
-    constexpr int k = Pose::kTangentSize;
-    if (relative.size() != Pose::kSize || !relative.allFinite()) {
-      throw std::invalid_argument("odometry: expected " + std::to_string(Pose::kSize) +
-                                  " finite numbers");
-    }
-    if (Pose::kModel == PoseModel::kSe3 && std::abs(relative.tail<4>().norm() - 1) > 1e-6) {
-      throw std::invalid_argument("odometry: the quaternion is not unit");
-    }
-    typename History<Pose>::Step step;
-    step.relative = relative;
-    step.covariance.setIdentity();
-    step.sqrt_information.setIdentity();
-    step.first_sight = 0;
-    if (first_is_known) return step;
-    if (covariance.rows() != k || covariance.cols() != k) {
-      throw std::invalid_argument("odometry_covariance: expected shape (" + std::to_string(k) +
-                                  ", " + std::to_string(k) + ")");
-    }
-    step.covariance = covariance;
-    try {
-      step.sqrt_information = SqrtInformation<k>(step.covariance);
-    } catch (const std::invalid_argument& error) {
-      throw std::invalid_argument(std::string("odometry_covariance: ") + error.what());
-    }
-    return step;
-  }
-
   void See(const Sight& sight) {
+    history_.sights.push_back(sight);
+    if (sight.Waits()) return;
     Object& object = history_.objects[sight.object];
     if (!object.sights.empty()) {
-      const int last = history_.sights[object.sights.back()].pose;
-      if (sight.pose - last > options_.loop_absence) {
-        loop_begin_ = loop_until_ < sight.pose ? last : std::min(loop_begin_, last);
-        loop_until_ = sight.pose + options_.window_poses;
-      }
+      CloseLoop(history_.sights[object.sights.back()].pose, sight.pose);
     }
-    object.sights.push_back(static_cast<int>(history_.sights.size()));
-    history_.sights.push_back(sight);
-    if (object.sights.size() == 1 && object.map.H.isZero(0)) {
-      object.chart = Birth(model_, history_, object);
-    }
+    object.sights.push_back(static_cast<int>(history_.sights.size()) - 1);
+    if (object.chart.isZero(0)) object.chart = Birth(model_, history_, object);
     const int count = static_cast<int>(object.sights.size());
     const bool again =
         std::find(std::begin(kTryAgainAt), std::end(kTryAgainAt), count) != std::end(kTryAgainAt);
@@ -211,10 +224,32 @@ class SessionOf : public Session {
     }
   }
 
+  // Whether an object that was back after an absence closes a loop: the window is watched for it.
+  bool CloseLoop(int last, int back) {
+    if (back - last <= options_.loop_absence) return false;
+    const int now = num_poses() - 1;
+    if (loop_until_ < now) {
+      loop_begin_ = last;
+      loop_misfits_ = false;
+    }
+    loop_begin_ = std::min(loop_begin_, last);
+    loop_until_ = now + options_.window_poses;
+    return true;
+  }
+
+  // Whether no place of an object fits all its sights.  Of one that was told late the window may
+  // show nothing: its poses have followed it away.
+  bool Misfits(const Object& object) const {
+    Vector9d anywhere = object.chart;
+    const double cost = Settle(model_, history_, object, kSettleIterations, &anywhere);
+    return 2 * cost > options_.loop_chi_square * 4 * static_cast<double>(object.sights.size());
+  }
+
   StepReport Update() {
     StepReport report;
     const int end = num_poses();
     report.pose = end - 1;
+    report.first_sight = history_.steps.back().first_sight;
     const int begin = std::max(end - options_.window_poses, FirstFree());
     if (begin >= end) return report;
     report.linearized = KeepPast(begin);
@@ -287,9 +322,10 @@ class SessionOf : public Session {
     loop_credit_ = std::min(loop_credit_ + 1.0 / options_.lap_every, 3.0);
     const bool loop_is_near = loop_until_ >= end - 1;
     if (loop_is_near && loop_credit_ >= 1 &&
-        window.chi_square > options_.loop_chi_square * window.residuals) {
+        (loop_misfits_ || window.chi_square > options_.loop_chi_square * window.residuals)) {
       loop_credit_ -= 1;
       loop_until_ = -1;
+      loop_misfits_ = false;
       report->closed_loop = true;
       return std::min(loop_begin_, begin);
     }
@@ -306,6 +342,7 @@ class SessionOf : public Session {
     int linearized = 0;
     const int first = history_.SightsBefore(begin);
     for (int row = first; row < static_cast<int>(history_.sights.size()); ++row) {
+      if (history_.sights[row].Waits()) continue;
       Object& object = history_.objects[history_.sights[row].object];
       const int known = object.is_stale ? 0 : object.past_sights;
       const int count = CountPast(history_, object, begin, known);
@@ -329,7 +366,8 @@ class SessionOf : public Session {
   void MarkStale(int begin) {
     for (int row = history_.SightsBefore(begin); row < static_cast<int>(history_.sights.size());
          ++row) {
-      history_.objects[history_.sights[row].object].is_stale = true;
+      const Sight& sight = history_.sights[row];
+      if (!sight.Waits()) history_.objects[sight.object].is_stale = true;
     }
   }
 
@@ -340,6 +378,7 @@ class SessionOf : public Session {
   double damping_ = kFirstDamping;  // of the window
   int loop_begin_ = 0;              // the pose that last saw what has come back
   int loop_until_ = -1;             // until when the window is watched for it
+  bool loop_misfits_ = false;       // it was told late, and needs no watching
   int next_lap_ = kSoonestLap;
   int next_recovery_ = 0;
   double lap_objects_ = 0;  // in the front of the last lap

@@ -10,6 +10,7 @@
 
 #include "dqslam/graph.h"
 #include "dqslam/online/options.h"
+#include "dqslam/online/relabel.h"
 #include "dqslam/online/sights.h"
 
 namespace dqslam::online {
@@ -17,6 +18,7 @@ namespace dqslam::online {
 /// What a step cost.
 struct StepReport {
   int pose = 0;             ///< row of the new pose
+  int first_sight = 0;      ///< row of the first it saw: boxes as they were given, then positions
   int window_poses = 0;     ///< poses of the window
   int window_objects = 0;   ///< objects that it saw
   int linearized = 0;       ///< sights, in the window and to keep what lies before it
@@ -48,8 +50,16 @@ class Session {
                             const Matrix9d& covariance,
                             const SizePrior& size) = 0;
 
-  /// Levenberg-Marquardt on all poses, priors of the map included; returns the cost.
-  virtual double Smooth(int iterations) = 0;
+  /// Moves boxes from object to object.  No object changes its place, but those that had none have
+  /// one now.  Throws std::invalid_argument, and then nothing has changed.
+  virtual void Relabel(const NewLabels& labels) = 0;
+
+  /// Multiplies the standard deviations of all steps, but not of the first pose, by two factors.
+  virtual void ScaleOdometry(double translation, double rotation) = 0;
+
+  /// Levenberg-Marquardt on all poses from `begin` on, priors of the map included; returns the
+  /// cost.
+  virtual double Smooth(int iterations, int begin) = 0;
 
   /// Takes over what was estimated elsewhere of the first poses and objects.  Later ones move
   /// rigidly with the last of these poses.
@@ -62,7 +72,8 @@ class Session {
   virtual int num_poses() const = 0;
   virtual int num_objects() const = 0;
   virtual Eigen::VectorXd PoseAt(int row) const = 0;
-  virtual RowMatrix Poses() const = 0;           ///< (poses, d)
+  virtual RowMatrix Poses() const = 0;                           ///< (poses, d)
+  virtual RowMatrix PosesAt(const IndexVector& rows) const = 0;  ///< (n, d)
   virtual RowMatrix Ellipsoids() const = 0;      ///< (objects, 9) log-Cholesky parameters
   virtual IndexVector Observations() const = 0;  ///< boxes of each object
 };

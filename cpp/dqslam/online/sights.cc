@@ -1,37 +1,8 @@
 #include "dqslam/online/sights.h"
 
-#include <cmath>
-#include <stdexcept>
-#include <string>
-
-#include "dqslam/whitening.h"
+#include "dqslam/online/checks.h"
 
 namespace dqslam::online {
-namespace {
-
-[[noreturn]] void Fail(const std::string& table, Eigen::Index row, const std::string& what) {
-  throw std::invalid_argument(table + " row " + std::to_string(row) + ": " + what);
-}
-
-template <int n>
-Eigen::Matrix<double, n, n> Whitening(const std::string& table,
-                                      const RowMatrix& covariances,
-                                      Eigen::Index row) {
-  using Square = Eigen::Matrix<double, n, n, Eigen::RowMajor>;
-  try {
-    return SqrtInformation<n>(Eigen::Map<const Square>(covariances.row(row).data()));
-  } catch (const std::invalid_argument& error) {
-    Fail(table, row, error.what());
-  }
-}
-
-void CheckShape(const char* table, const RowMatrix& values, Eigen::Index rows, int columns) {
-  if (values.rows() == rows && (rows == 0 || values.cols() == columns)) return;
-  throw std::invalid_argument(std::string(table) + ": expected " + std::to_string(rows) +
-                              " rows of " + std::to_string(columns));
-}
-
-}  // namespace
 
 std::vector<Sight> CheckedSights(const NewSights& given, int pose, int objects) {
   const Eigen::Index boxes = given.object.size(), positions = given.position_object.size();
@@ -43,11 +14,7 @@ std::vector<Sight> CheckedSights(const NewSights& given, int pose, int objects) 
     throw std::invalid_argument("box_truncated: expected a row of 4 for each box");
   }
   const Eigen::Index born = given.log_size_mean.size();
-  for (Eigen::Index row = 0; row < born; ++row) {
-    if (!std::isfinite(given.log_size_mean[row]) || !(given.log_size_sigma[row] > 0)) {
-      Fail("log_size_sigma", row, "expected a finite mean and a positive sigma");
-    }
-  }
+  CheckSizes(given.log_size_mean, given.log_size_sigma);
   std::vector<bool> seen(born, false);
   std::vector<Sight> sights;
   for (Eigen::Index row = 0; row < boxes + positions; ++row) {
@@ -58,14 +25,16 @@ std::vector<Sight> CheckedSights(const NewSights& given, int pose, int objects) 
     sight.pose = pose;
     sight.object = is_box ? given.object[own] : given.position_object[own];
     sight.is_box = is_box;
-    if (sight.object < 0 || sight.object >= objects + born) Fail(table, own, "no such object");
+    const int least = is_box ? -1 : 0;
+    if (sight.object < least || sight.object >= objects + born)
+      FailAt(table, own, "no such object");
     if (sight.object >= objects) seen[sight.object - objects] = true;
     if (is_box) {
       sight.value = given.box.row(own).transpose();
       sight.sqrt_information = Whitening<4>("box_covariance", given.covariance, own);
       sight.truncated = given.truncated.row(own);
       if (sight.value[0] >= sight.value[2] || sight.value[1] >= sight.value[3]) {
-        Fail(table, own, "inverted or empty box");
+        FailAt(table, own, "inverted or empty box");
       }
     } else {
       sight.value << given.position.row(own).transpose(), 0;
@@ -73,11 +42,11 @@ std::vector<Sight> CheckedSights(const NewSights& given, int pose, int objects) 
       sight.sqrt_information.topLeftCorner<3, 3>() =
           Whitening<3>("position_covariance", given.position_covariance, own);
     }
-    if (!sight.value.allFinite()) Fail(table, own, "NaN or infinite number");
+    if (!sight.value.allFinite()) FailAt(table, own, "NaN or infinite number");
     sights.push_back(sight);
   }
   for (Eigen::Index row = 0; row < born; ++row) {
-    if (!seen[row]) Fail("log_size_mean", row, "the new object is not seen");
+    if (!seen[row]) FailAt("log_size_mean", row, "the new object is not seen");
   }
   return sights;
 }

@@ -6,7 +6,8 @@
 
 namespace dqslam::online {
 
-/// What one pose saw.  Objects are rows; those from the number of objects on are new, in order.
+/// What one pose saw.  Objects are rows; those from the number of objects on are new, in order, and
+/// a box of -1 waits for its object.
 struct NewSights {
   IndexVector object;
   RowMatrix box;         ///< (n, 4) undistorted pixels

@@ -47,7 +47,9 @@ Graph ToGraph(const Model& model, const History<Pose>& history, std::vector<int>
     graph.size_prior.log_mean[row] = history.objects[(*rows)[row]].size.log_mean;
     graph.size_prior.log_sigma[row] = history.objects[(*rows)[row]].size.log_sigma;
   }
-  const auto takes_part = [&](const Sight& sight) { return row_of_object[sight.object] >= 0; };
+  const auto takes_part = [&](const Sight& sight) {
+    return !sight.Waits() && row_of_object[sight.object] >= 0;
+  };
   int boxes = 0, positions = 0;
   for (const Sight& sight : history.sights) {
     if (takes_part(sight)) ++(sight.is_box ? boxes : positions);
