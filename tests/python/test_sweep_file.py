@@ -134,6 +134,56 @@ scenario.odometry.translation_sigma_m = 3
     assert len(said) == len(set(said))
 
 
+WRONG_IN_ALL_PARTS = """\
+scenario = {scenario}
+trails = 3
+bound = 3
+[fixed]
+estimator.los = "none"
+scenario.object = "cubes"
+[grid]
+estimator.max_iteration = 3
+estimator.loss = ["cauchi"]
+[random]
+estimator.tolerance = {{ low = 1.0 }}
+"""
+
+
+@pytest.mark.parametrize(
+    ("scenario", "of_scenario"),
+    [
+        ('"paper"', "6: unknown key scenario.object; did you mean objects?"),
+        ('"moon"', "1: scenario: moon: no such scenario; by name there are: honest"),
+        ('"mine.toml"', "mine.toml:1: unknown key camra; did you mean camera?"),
+        ('"empty.toml"', "empty.toml: is empty"),
+        ("3", "1: scenario: Input should be a valid string, not 3"),
+    ],
+)
+def test_what_is_wrong_in_one_part_hides_nothing_in_another(write, scenario, of_scenario):
+    """Misspelt keys with a value of the wrong kind too; settings of no scenario are not judged."""
+    write("camra = 1\nbase = 'paper'\n", "mine.toml")
+    write("", "empty.toml")
+    path = write(WRONG_IN_ALL_PARTS.format(scenario=scenario))
+    with pytest.raises(FileError) as caught:
+        load_sweep(path)
+    said = sorted(str(caught.value).replace(f"{path}:", "").splitlines())
+    expected = [
+        "11: estimator.tolerance.high is missing",
+        "11: unknown key estimator.tolerance; did you mean grow_tolerance?",
+        "2: unknown key trails; did you mean trials?",
+        "3: bound: Input should be a valid boolean",
+        "5: unknown key estimator.los; did you mean loss?",
+        "8: estimator.max_iteration: expected values, like [1, 2]",
+        "8: unknown key estimator.max_iteration; did you mean max_iterations?",
+        "9: estimator.loss: Input should be 'none', 'huber'",
+    ]
+    (other,) = [line for line in said if not line.startswith(tuple(expected))]
+    assert of_scenario in other
+    assert len(said) == len(expected) + 1
+    for start in expected:
+        assert any(line.startswith(start) for line in said)
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [

@@ -82,6 +82,28 @@ def check_model(model: type[Model], content: Mapping[str, Any], file: TomlFile) 
         raise FileErrors(mistakes) from None
 
 
+def right_keys(model: type[BaseModel], content: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what a model accepts of a file's content, whole keys of its top."""
+    try:
+        model.model_validate(dict(content))
+    except ValidationError as error:
+        wrong = {item["loc"][0] for item in error.errors() if item["loc"]}
+        return {key: value for key, value in content.items() if key not in wrong}
+    return dict(content)
+
+
+def unknown_keys(
+    model: type[BaseModel], content: Mapping[str, Any], file: TomlFile
+) -> list[FileError]:
+    """Return what `check_model` says of the keys alone, whatever their values."""
+    try:
+        model.model_validate(dict(content))
+    except ValidationError as error:
+        unknown = [item for item in error.errors() if item["type"] == "extra_forbidden"]
+        return [_mistake(model, content, file, item) for item in unknown]
+    return []
+
+
 def _mistake(
     model: type[BaseModel], content: Mapping[str, Any], file: TomlFile, item: Any
 ) -> FileError:

@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
 
 from dqslam._files import FileError, FileErrors
-from dqslam.config import TomlFile, check_model, read_toml
+from dqslam.config import TomlFile, check_model, read_toml, right_keys, unknown_keys
 from dqslam.scenario import Scenario, load_scenario
 from dqslam.sweep.settings import TrialSettings
 
@@ -126,30 +126,53 @@ def load_sweep(path: str | Path) -> Sweep:
         setting and value, and the line of each.
     """
     file = read_toml(path)
-    said = check_model(_File, file.content, file)
-    try:
-        beside = file.path.parent / said.scenario
-        scenario = load_scenario(beside if beside.is_file() else said.scenario)
-    except FileNotFoundError as error:
-        raise file.error(("scenario",), f"scenario: {error}") from None
     mistakes: list[FileError] = []
+    said = _top(file, mistakes)
+    scenario = _scenario(file, said, mistakes)
     fixed = {
         name: [_Value(location, value)] for name, location, value in _leaves(("fixed",), said.fixed)
     }
     grid, random = _grid(file, said, mistakes), _random(file, said, mistakes)
     _refuse_twice(file, (fixed, grid, random), mistakes)
+    _refuse_unknown(file, scenario, said, mistakes)
     cells = []
     for values, places in _combinations(said.samples, fixed, grid, random):
         try:
-            settings = _settings(file, said.bound, scenario, values, places)
+            content, as_cell = _cell(file, said, scenario, values, places)
+            settings = check_model(TrialSettings, content, as_cell)
         except FileErrors as error:
             mistakes += error.errors
         else:
             varied = {name: value for name, value in values.items() if name not in fixed}
             cells.append(Cell(varied, settings))
-    if mistakes:  # of which a wrong value makes one in each cell
+    if mistakes or scenario is None:  # a wrong value makes one in each cell
         raise FileErrors(list({str(mistake): mistake for mistake in mistakes}.values()))
     return Sweep(scenario.name, tuple(cells), tuple(range(said.seed, said.seed + said.trials)))
+
+
+def _top(file: TomlFile, mistakes: list[FileError]) -> _File:
+    """Check the top; for what is wrong there the default stands in, so that the rest is checked."""
+    try:
+        return check_model(_File, file.content, file)
+    except FileErrors as error:
+        mistakes += error.errors
+        return _File.model_validate({"scenario": ""} | right_keys(_File, file.content))
+
+
+def _scenario(file: TomlFile, said: _File, mistakes: list[FileError]) -> Scenario | None:
+    """Load the scenario; None where it is wrong."""
+    if not isinstance(file.content.get("scenario"), str):
+        return None  # as was said of the top
+    beside = file.path.parent / said.scenario
+    try:
+        return load_scenario(beside if beside.is_file() else said.scenario)
+    except FileNotFoundError as error:
+        mistakes.append(file.error(("scenario",), f"scenario: {error}"))
+    except FileErrors as error:
+        mistakes += error.errors
+    except FileError as error:
+        mistakes.append(error)
+    return None
 
 
 def _leaves(location: Location, table: Mapping[str, Any]) -> Iterator[tuple[str, Location, Any]]:
@@ -210,6 +233,16 @@ def _refuse_twice(file: TomlFile, tables: Sequence[_Varied], mistakes: list[File
         seen.add(name)
 
 
+def _refuse_unknown(
+    file: TomlFile, scenario: Scenario | None, said: _File, mistakes: list[FileError]
+) -> None:
+    """Refuse misspelt names whose values are wrong too, which are part of no cell."""
+    for table in ("grid", "random"):
+        for name, place, value in _leaves((table,), getattr(said, table)):
+            content, as_cell = _cell(file, said, scenario, {name: value}, {name: place})
+            mistakes += unknown_keys(TrialSettings, content, as_cell)
+
+
 def _combinations(
     samples: int, fixed: _Varied, grid: _Varied, random: _Varied
 ) -> Iterator[tuple[dict[str, Any], dict[str, Location]]]:
@@ -225,15 +258,25 @@ def _combinations(
             )
 
 
-def _settings(
+def _cell(
     file: TomlFile,
-    bound: bool,
-    scenario: Scenario,
+    said: _File,
+    scenario: Scenario | None,
     values: Mapping[str, Any],
     places: Mapping[str, Location],
-) -> TrialSettings:
-    """Put values into the settings of a scenario and of the default estimator."""
-    content: dict[str, Any] = {"scenario": scenario.model_dump(), "estimator": {}, "bound": bound}
+) -> tuple[dict[str, Any], _CellFile]:
+    """Put values into the settings of a scenario and of the default estimator.
+
+    Without a scenario its settings are left out: nobody knows which are right.
+    """
+    if scenario is None:
+        scenario = load_scenario("paper")
+        values = {name: value for name, value in values.items() if name.split(".")[0] != "scenario"}
+    content: dict[str, Any] = {
+        "scenario": scenario.model_dump(),
+        "estimator": {},
+        "bound": said.bound,
+    }
     lines: dict[Location, int] = {}
     if ("bound",) in file.lines:
         lines[("bound",)] = file.lines[("bound",)]
@@ -248,7 +291,7 @@ def _settings(
                 table[step] = {}
             table = table[step]
         table[steps[-1]] = value
-    return check_model(TrialSettings, content, _CellFile(file.path, "", content, lines))
+    return content, _CellFile(file.path, "", content, lines)
 
 
 def _line(file: TomlFile, location: Location) -> int:
