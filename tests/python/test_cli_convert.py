@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dqslam.cli import main
-from dqslam.io import FileError, read_camera, read_detections, read_mount, read_trajectory
+from dqslam.io import FileError, convert, read_camera, read_detections, read_mount, read_trajectory
 
 CAMERA = {"fx": 500.5, "fy": 501, "cx": 320.25, "cy": 240, "width": 640, "height": 480}
 BOXES = """frame,timestamp,x1,y1,x2,y2,score,class_id,class_name,track_id
@@ -204,6 +204,9 @@ def test_a_bag_becomes_a_folder(folder, call):
         "camera.json",
         "trajectory.txt",
     ]
+    shares = []
+    convert(folder / "bag", folder / "told", progress=shares.append)
+    assert shares == [1 / 3, 2 / 3, 1.0]
     assert "no place" not in call("bag alone.txt --to tum")
     assert (folder / "alone.txt").read_text() == (folder / "out/trajectory.txt").read_text()
     assert "out: is there already, and not empty" in call("bag out")

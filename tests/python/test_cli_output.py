@@ -63,3 +63,18 @@ def test_a_bar_is_for_terminals(capsys, monkeypatch, quiet):
     shown = capsys.readouterr()
     assert shown.out == ""
     assert ("3/4" in shown.err) != quiet
+
+
+def test_the_time_left_is_shown_once_a_share_is_told(capsys, monkeypatch):
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    monkeypatch.setenv("TTY_COMPATIBLE", "1")
+    monkeypatch.setenv("COLUMNS", "120")
+    with Output().share("reading"):
+        pass
+    untold = capsys.readouterr().err
+    assert "reading" in untold
+    assert "0:00:00" in untold  # since when
+    assert "%" not in untold
+    with Output().steps("reading", 4) as done:
+        done()
+    assert "25%" in capsys.readouterr().err

@@ -254,7 +254,16 @@ def test_outlines_touch_the_boxes_of_worst_and_median(results):
 @pytest.mark.parametrize("kind", ["svg", "png", "pdf"])
 def test_all_figures_in_each_format(tmp_path, files, results, truth, kind):
     objects = io.read_true_objects(files.objects)
-    drawn = plot_results(results, tmp_path / "new", kind=kind, groundtruth=truth, objects=objects)
+    shares = []
+    drawn = plot_results(
+        results,
+        tmp_path / "new",
+        kind=kind,
+        groundtruth=truth,
+        objects=objects,
+        progress=shares.append,
+    )
+    assert shares == [0.2, 0.4, 0.6, 0.8, 1.0]
     names = ["boxes", "map", "position_error", "residuals", "rotation_error"]
     assert [path.name for path in drawn.written] == [f"{name}.{kind}" for name in names]
     assert sorted(path.name for path in (tmp_path / "new").iterdir()) == [

@@ -8,6 +8,7 @@ import pytest
 import planted
 from dqslam.cli import main
 from dqslam.io import load_results
+from dqslam.view import build_scene, write_rerun
 
 
 @pytest.fixture
@@ -53,6 +54,13 @@ def test_what_is_logged(files, tmp_path):
     expected = results.boxes.box[:, :2].reshape(planted.POSES, 5, 2) + 0.5
     np.testing.assert_allclose(corners, expected, atol=1e-3)
     assert len(columns["/world/camera/outlines"]["LineStrips2D:strips"]) == planted.POSES
+
+
+def test_the_share_of_images_that_is_written_is_told(files, tmp_path):
+    pytest.importorskip("rerun")
+    shares = []
+    write_rerun(build_scene(load_results(files.results)), tmp_path / "map.rrd", shares.append)
+    np.testing.assert_allclose(shares, np.arange(1, planted.POSES + 1) / planted.POSES)
 
 
 def test_without_the_sdk_it_says_what_is_missing(files, tmp_path, monkeypatch, capsys):

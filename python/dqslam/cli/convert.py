@@ -63,9 +63,15 @@ def convert(
         classes=None if classes is None else io.read_class_names(classes),
         body_from_camera=None if camera_in_body is None else io.read_mount(camera_in_body),
     )
-    with output.waiting("converting"):
+    with output.share("converting") as progress:
         written = io.convert(
-            source, out, format=format_, to=to, topics=topic or (), context=context
+            source,
+            out,
+            format=format_,
+            to=to,
+            topics=topic or (),
+            context=context,
+            progress=progress,
         )
     for file in written:
         loses = f"; no place for {' and '.join(file.loses)}" if file.loses else ""

@@ -86,12 +86,29 @@ class Output:
 
     @contextmanager
     def share(self, what: str) -> Iterator[Callable[[float], None]]:
-        """Show a bar of the share, 0 to 1, that is done, with the time left."""
-        from rich.progress import BarColumn, TaskProgressColumn, TimeRemainingColumn
+        """Show since when something goes on, and a bar with the time left once it is told a share.
 
-        columns = (what, BarColumn(), TaskProgressColumn(), TimeRemainingColumn(), "left")
-        with self._bar(columns, 1.0) as update:
-            yield update
+        That is the share of the work, 0 to 1, that is done.
+        """
+        from rich.progress import (
+            BarColumn,
+            SpinnerColumn,
+            TaskProgressColumn,
+            TimeElapsedColumn,
+            TimeRemainingColumn,
+        )
+
+        columns = (
+            SpinnerColumn(),
+            what,
+            BarColumn(),
+            TaskProgressColumn(),
+            TimeElapsedColumn(),
+            TimeRemainingColumn(),
+            "left",
+        )
+        with self._bar(columns, None) as update:
+            yield lambda done: update(done, total=1.0)
 
     @contextmanager
     def steps(self, what: str, total: int) -> Iterator[Callable[[], None]]:
@@ -129,4 +146,4 @@ class Output:
         shown = self._shows_progress and console.is_terminal
         with Progress(*columns, console=console, disable=not shown, transient=True) as bar:
             task = bar.add_task("", total=total)
-            yield lambda done: bar.update(task, completed=done)
+            yield lambda done, **changes: bar.update(task, completed=done, **changes)

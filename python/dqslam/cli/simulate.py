@@ -43,11 +43,14 @@ def simulate(
 
     output = Output(quiet=quiet, as_json=json)
     chosen = load_scenario(scenario)
-    with results_directory(out), output.waiting("simulating"):
+    with results_directory(out), output.steps("simulating", 3) as done:
         recording, truth = simulate(chosen, seed=seed)
+        done()
         with uninterrupted():
             io.save_recording(recording, out)
+            done()
             io.save_truth(truth, recording, out)
+            done()
             for name, settings in _commands(out).items():
                 write_text(out / f"{name}.toml", toml_text(settings))
             save_settings(context, out / CONFIG)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -63,6 +63,7 @@ def convert(
     to: str | None = None,
     topics: Sequence[str] = (),
     context: ConvertContext | None = None,
+    progress: Callable[[float], None] = lambda share: None,
 ) -> list[Written]:
     """Read one file and write it in another format, whole or not at all.
 
@@ -77,6 +78,8 @@ def convert(
         Of a bag, where a kind has several.
     context
         Size of the image, times of frames, names of classes, mount of the camera.
+    progress
+        Of a bag that becomes several files: told the share of them that is written.
     """
     source, out = Path(source), Path(out)
     if out.exists() and source.exists() and out.samefile(source):
@@ -95,11 +98,12 @@ def convert(
         raise FileError(source, f"has no topic of {known}")
     written: list[Written] = []
     with whole_folder(out) as folder:
-        for kind in kinds:
+        for done, kind in enumerate(kinds, start=1):
             _, name, target_name = FROM_BAG[kind]
             target = choose_format(out, target_name, FORMATS[kind], kind)
             more = _convert(source, folder / name, kind, BAG, target, named.get(kind), context)
             written += [Written(out / one.path.name, one.what, one.loses) for one in more]
+            progress(done / len(kinds))
     return written
 
 

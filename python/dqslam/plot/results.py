@@ -1,5 +1,6 @@
 """All figures of a directory of results."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -35,6 +36,7 @@ def plot_results(
     objects: TrueObjects | None = None,
     align: Align = "se3",
     max_time_difference: float | None = None,
+    progress: Callable[[float], None] = lambda share: None,
 ) -> Drawn:
     """Draw all that the results allow into files of a kind, "svg", "png" or "pdf".
 
@@ -48,6 +50,8 @@ def plot_results(
         What is true, in any world, as for ``evaluate_results``.
     align, max_time_difference
         As there.
+    progress
+        Told the share of the files that is written.
     """
     figures: dict[str, Figure] = {}
     left_out: dict[str, str] = {}
@@ -70,6 +74,7 @@ def plot_results(
         for name, figure in figures.items():
             written.append(folder / f"{name}.{kind}")
             save_figure(figure, written[-1])
+            progress(len(written) / len(figures))
     return Drawn(tuple(sorted(written)), left_out)
 
 

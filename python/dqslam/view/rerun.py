@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,8 +18,10 @@ if TYPE_CHECKING:
     from rerun import RecordingStream
 
 
-def write_rerun(scene: Scene, path: str | Path) -> None:
-    """Write an ``.rrd`` file; needs ``dqslam[rerun]``.
+def write_rerun(
+    scene: Scene, path: str | Path, progress: Callable[[float], None] = lambda share: None
+) -> None:
+    """Write an ``.rrd`` file; needs ``dqslam[rerun]``. `progress` gets the share of the images.
 
     ``world/``: ``estimate``, ``odometry``, ``truth``, ``objects``, ``true_objects``, ``covariance``
     once and for all; on the timelines ``time`` [s] and ``image`` the ``camera``, and in its image
@@ -35,6 +38,7 @@ def write_rerun(scene: Scene, path: str | Path) -> None:
         _log_world(stream, scene)
         for frame in range(len(scene.timestamps)):
             _log_frame(stream, scene, frame)
+            progress((frame + 1) / len(scene.timestamps))
         stream.disconnect()  # which writes what is left
 
 
