@@ -35,6 +35,10 @@ def run(capsys, *arguments):
     return code, capsys.readouterr()
 
 
+def written(kind):
+    return sorted(["plot.toml", *(f"{name}.{kind}" for name in FIGURES)])
+
+
 def names(folder):
     return sorted(path.name for path in folder.iterdir())
 
@@ -45,7 +49,7 @@ def test_with_the_truth(tmp_path, capsys, files):
         "--groundtruth", files.groundtruth, "--objects", files.objects,
     )  # fmt: skip
     assert (code, said.err) == (0, "")
-    assert names(tmp_path / "new") == [f"{name}.png" for name in FIGURES]
+    assert names(tmp_path / "new") == written("png")
     assert said.out.splitlines() == [f"wrote {tmp_path / 'new' / name}.png" for name in FIGURES]
 
 
@@ -63,7 +67,7 @@ def test_a_simulated_recording_has_its_truth_beside(tmp_path, capsys):
     for given in (tmp_path / "sim", tmp_path / "sim" / "results"):
         code, said = run(capsys, given, "--out", tmp_path / "of" / given.name, "--quiet")
         assert (code, said.out) == (0, "")
-        assert names(tmp_path / "of" / given.name) == [f"{name}.svg" for name in FIGURES]
+        assert names(tmp_path / "of" / given.name) == written("svg")
 
 
 def test_a_table_top_with_images_by_their_numbers(tmp_path, capsys):

@@ -5,6 +5,7 @@ import tomllib
 
 import pytest
 
+import planted
 from dqslam.cli import main
 
 DEMO = ["demo", "--drives", "1", "--quiet"]
@@ -47,6 +48,35 @@ def test_what_was_in_force_stands_beside_the_result_and_gives_it_again(settings,
     for name in ("boxes.csv", "odometry.txt", "objects.csv", "odometry_covariance.csv"):
         first, second = ((tmp_path / folder / name).read_bytes() for folder in ("first", "again"))
         assert first == second
+
+
+def test_options_of_a_look_stand_beside_it(settings, tmp_path, capsys):
+    pytest.importorskip("matplotlib")
+    results = planted.write_planted(tmp_path).results
+    before = (results / "config.toml").exists()
+    given = settings(f'directory = "{results}"\nalign = "se2"\n')
+    assert main(["plot", *given, "--out", str(results), "--format", "png", "-q"]) == 0
+    assert main(["view", *given, "--export", "page", "-q"]) == 0
+    assert (results / "config.toml").exists() == before  # that is of `run`
+    common = {"directory": str(results), "align": "se2"}
+    for path, more in (
+        (results / "plot.toml", {"command": "plot", "out": str(results), "format": "png"}),
+        (
+            tmp_path / "page" / "view.toml",
+            {"command": "view", "export": "page", "host": "127.0.0.1", "port": 8080},
+        ),
+    ):
+        written = tomllib.loads(path.read_text())
+        written.pop("dqslam_version", None)
+        assert written == common | more
+    figure, page = results / "map.png", tmp_path / "page" / "scene.js"
+    first = page.read_bytes()
+    figure.unlink()
+    page.unlink()
+    assert main(["plot", "--config", str(results / "plot.toml"), "-q"]) == 0
+    assert main(["view", "--config", "page/view.toml", "-q"]) == 0
+    assert figure.exists()
+    assert page.read_bytes() == first
 
 
 def test_paper_and_its_configuration(tmp_path, capsys):
@@ -98,6 +128,12 @@ def test_all_mistakes_are_said_at_once_with_their_lines(settings, capsys):
         ("run", "trust-ids = 1\n", "my.toml:1: unknown key trust-ids; did you mean trust_ids?"),
         ("evaluate", "rpe_delta = [1]\n", "my.toml:1: rpe_delta: Input should be a valid number"),
         ("simulate", "seed 1\n", "my.toml:1: not a TOML file"),
+        ("sweep", 'backend = "magic"\n', "my.toml:1: backend: Input should be 'serial', 'proc"),
+        ("sweep", "job = 1\n", "my.toml:1: unknown key job; did you mean jobs?"),
+        ("plot", 'format = "gif"\n', "my.toml:1: format: Input should be 'svg', 'png' or 'pdf'"),
+        ("plot", "video_rate = 0.0\n", "my.toml:1: video_rate: Input should be greater than or"),
+        ("view", "port = 0\n", "my.toml:1: port: Input should be greater than or equal to 1"),
+        ("view", 'command = "plot"\n', "my.toml:1: command: Input should be 'view', not 'plot'"),
         ("paper", "bound = 1\n", "my.toml:1: bound: Input should be a valid boolean"),
     ],
 )

@@ -4,6 +4,7 @@ import signal
 import subprocess
 import sys
 import time
+import tomllib
 
 import pytest
 
@@ -55,6 +56,21 @@ def test_the_table_says_what_the_summary_says(command, tmp_path, capsys, monkeyp
     low, high = spread["mean_interval"]
     assert f"{spread['mean']:.3g} [{low:.2g},{high:.2g}]" in shown
     assert f"{cells[0]['metrics']['rmse_landmark']['mean']:.3g}" in shown
+
+
+def test_what_was_in_force_goes_on_where_it_was(command, tmp_path, capsys):
+    assert main([*command, "--jobs", "1", "--quiet"]) == 0
+    config = tmp_path / "a" / "b" / "config.toml"
+    written = tomllib.loads(config.read_text())
+    written.pop("dqslam_version", None)  # where the package is not installed
+    assert written == {
+        "command": "sweep",
+        "file": str(tmp_path / "sweep.toml"),
+        "out": str(tmp_path / "a" / "b"),
+        "jobs": 1,
+    }
+    assert main(["sweep", "--config", str(config)]) == 0
+    assert "0 trials run, 8 were there already" in capsys.readouterr().out
 
 
 def test_json_is_the_summary_and_quiet_is_nothing(command, tmp_path, capsys):

@@ -12,6 +12,7 @@ from dqslam.cli.found import results_in, truth_of
 from dqslam.cli.options import Alignment, FrameRate, FrameTimesFile, TrueObjectsFile, TruthFile
 from dqslam.cli.output import Json, Output, Quiet
 from dqslam.cli.results import results_directory
+from dqslam.cli.settings import ConfigFile, save_settings
 
 if TYPE_CHECKING:
     from dqslam.io import FrameTimes, Results
@@ -20,6 +21,7 @@ _STILLS = 9  # spread evenly, where no frames are asked for
 
 
 def plot(
+    context: typer.Context,
     directory: Annotated[
         Path,
         typer.Argument(
@@ -70,13 +72,14 @@ def plot(
         str | None,
         typer.Option(help="Of a sweep: the setting to draw along. Default: the first varied."),
     ] = None,
+    config: ConfigFile = None,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
     """Draw the results in DIR: the map from above, errors over time, residuals, boxes.
 
     Of a sweep, its errors against what was varied. Needs the extra "plot"; docs/plots.md says what
-    each figure shows.
+    each figure shows. Writes its options, plot.toml, beside them.
     """
     from dqslam import io
 
@@ -92,7 +95,7 @@ def plot(
     out = directory / "figures" if out is None else out
     left_out: dict[str, str] = {}
     if _is_sweep(directory):
-        files = [_plot_sweep(directory, out, kind, parameter)]
+        files = [_plot_sweep(directory, out, kind, parameter, output)]
     else:
         if parameter is not None:
             raise ValueError(f"--parameter is of a sweep, which {directory} is not")
@@ -109,6 +112,7 @@ def plot(
         )
         if images is not None:
             files += _overlay(results, shown, out, video, video_rate, output)
+    save_settings(context, out / "plot.toml")
     for name, why in left_out.items():
         output.line(f"no {name}: {why}")
     for file in files:
@@ -130,13 +134,15 @@ def _frame_times(table: Path | None, rate: float | None) -> FrameTimes | None:
     return None if rate is None else io.frame_rate(rate)
 
 
-def _plot_sweep(directory: Path, out: Path, kind: str, parameter: str | None) -> Path:
+def _plot_sweep(
+    directory: Path, out: Path, kind: str, parameter: str | None, output: Output
+) -> Path:
     from dqslam.plot.style import save_figure
     from dqslam.plot.sweep import draw_sweep, read_summary
 
-    figure = draw_sweep(read_summary(directory), parameter)
     path = out / f"sweep.{kind}"
-    save_figure(figure, path)
+    with output.waiting("drawing"):
+        save_figure(draw_sweep(read_summary(directory), parameter), path)
     return path
 
 
@@ -155,9 +161,15 @@ def _plot_results(
 
     truth = None if groundtruth is None else io.read_trajectory(groundtruth, repeated_times=True)
     true_objects = None if objects is None else io.read_true_objects(objects)
-    with output.waiting("drawing"), results_directory(out):
+    with output.share("drawing") as progress, results_directory(out):
         drawn = plot_results(
-            results, out, kind=kind, groundtruth=truth, objects=true_objects, align=align
+            results,
+            out,
+            kind=kind,
+            groundtruth=truth,
+            objects=true_objects,
+            align=align,
+            progress=progress,
         )
     return list(drawn.written), dict(drawn.left_out)
 

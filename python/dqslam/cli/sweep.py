@@ -8,6 +8,8 @@ import typer
 
 from dqslam.cli.options import BackendName, Jobs, ResultDirectory, Scheduler
 from dqslam.cli.output import Json, Output, Quiet
+from dqslam.cli.results import uninterrupted
+from dqslam.cli.settings import CONFIG, ConfigFile, save_settings
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -18,6 +20,7 @@ NAMED = 5  # failures of one kind that are named
 
 
 def sweep(
+    context: typer.Context,
     file: Annotated[
         Path, typer.Argument(help="TOML: a scenario, seeds, and the settings to vary.")
     ],
@@ -25,13 +28,15 @@ def sweep(
     jobs: Jobs = None,
     backend: BackendName = None,
     scheduler: Scheduler = None,
+    config: ConfigFile = None,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
     """Vary settings of a scenario or the estimator, over a grid or at random, with many seeds.
 
     Stopped or killed, the same command goes on where it was. Writes results.csv, a row for each
-    trial, results.parquet where pyarrow is installed, summary.json, and sweep.toml, the file.
+    trial, results.parquet where pyarrow is installed, summary.json, sweep.toml, the
+    file, and config.toml.
     """
     from dqslam._files import read_text, write_text
     from dqslam.sweep import load_sweep, run_sweep
@@ -42,7 +47,9 @@ def sweep(
         done = run_sweep(
             asked, out, jobs=jobs, backend=backend, scheduler=scheduler, progress=progress
         )
-    write_text(out / "sweep.toml", read_text(file))
+    with uninterrupted():
+        write_text(out / "sweep.toml", read_text(file))
+        save_settings(context, out / CONFIG)
     output.table(_table(done.summary))
     if done.found:
         output.line(f"{done.done} trials run, {done.found} were there already")

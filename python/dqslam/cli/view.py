@@ -10,12 +10,14 @@ import typer
 from dqslam.cli.found import results_in, truth_of
 from dqslam.cli.options import Alignment, TrueObjectsFile, TruthFile
 from dqslam.cli.output import Json, Output, Quiet
+from dqslam.cli.settings import ConfigFile, save_settings
 
 if TYPE_CHECKING:
     from dqslam.view import Scene
 
 
 def view(
+    context: typer.Context,
     directory: Annotated[
         Path,
         typer.Argument(metavar="DIR", help="What `dqslam run` wrote, or `dqslam simulate` before."),
@@ -39,6 +41,7 @@ def view(
     port: Annotated[
         int, typer.Option(min=1, max=65535, help="Its port, or the next one that is free.")
     ] = 8080,
+    config: ConfigFile = None,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
@@ -51,22 +54,24 @@ def view(
     from dqslam.view import build_scene, rgb, write_page, write_rerun
 
     output = Output(quiet=quiet, as_json=json)
-    results = io.load_results(results_in(directory))
-    groundtruth, objects = truth_of(results.directory, groundtruth, objects)
-    scene = build_scene(
-        results,
-        groundtruth=(
-            None if groundtruth is None else io.read_trajectory(groundtruth, repeated_times=True)
-        ),
-        objects=None if objects is None else io.read_true_objects(objects),
-        align=align,
-    )
+    with output.waiting("reading"):
+        results = io.load_results(results_in(directory))
+        groundtruth, objects = truth_of(results.directory, groundtruth, objects)
+        scene = build_scene(
+            results,
+            groundtruth=None
+            if groundtruth is None
+            else io.read_trajectory(groundtruth, repeated_times=True),
+            objects=None if objects is None else io.read_true_objects(objects),
+            align=align,
+        )
     written: dict[str, str] = {}
     if export is not None:
         written["page"] = str(write_page(scene, export))
+        save_settings(context, export / "view.toml")
     if rerun is not None:
-        with output.waiting("writing"):
-            write_rerun(scene, rerun)
+        with output.share("writing") as progress:
+            write_rerun(scene, rerun, progress)
         written["rerun"] = str(rerun)
     if ply is not None:
         io.write_ply(ply, results, [rgb(one.color) for one in scene.objects], rgb(ESTIMATE))
