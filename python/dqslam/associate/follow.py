@@ -49,7 +49,8 @@ class Follower:
         end = len(scene.recording.timestamps)
         size = max(SHORTEST_PART, -(-end // PARTS))
         for part, begin in enumerate(range(1, end, size)):
-            self._go_on(begin, min(begin + size, end))
+            self.assign_ahead(begin, min(begin + size, end))
+            self.give_birth()
             scene.estimate(max_iterations=MAX_ITERATIONS)
             if len(scene.poses) >= FIRST_NOISE and part % NOISE_EVERY == 0:
                 scene.estimate_noise()
@@ -58,11 +59,14 @@ class Follower:
             scene.left_out = find_misfits(scene)
             progress(len(scene.poses) / end)
 
-    def _go_on(self, begin: int, end: int) -> None:
+    def assign_ahead(self, begin: int, end: int) -> None:
+        """Go on by odometry to some poses, and give their boxes to the objects they clearly show.
+
+        What is known of the path and the objects is that of the pose before ``begin``.
+        """
         scene = self.scene
-        last = begin - 1
         known = np.flatnonzero(scene.box_counts > 0)
-        known, covariance = scene.joint_covariance(last, known)
+        known, covariance = scene.joint_covariance(begin - 1, known)
         scene.extend(end)
         odometry = scene.recording.odometry
         k = odometry.covariance.shape[1]
@@ -72,10 +76,8 @@ class Follower:
             covariance[:, :k] = covariance[:, :k] @ moved.T
             covariance[:k, :k] += odometry.covariance[pose - 1]
             self._assign(pose, known, covariance)
-        self.give_birth()
 
     def _assign(self, pose: int, known: NDArray[np.int64], covariance: NDArray[np.float64]) -> None:
-        """Give the boxes of a pose to the objects that they clearly show."""
         scene = self.scene
         rows = np.flatnonzero(scene.recording.detections.pose == pose)
         if not rows.size or not known.size:
@@ -97,9 +99,7 @@ class Follower:
         """Count that a tracklet does not fit its object; in the end, cut it in two."""
         self._strikes[tracklet] = self._strikes.get(tracklet, 0) + 1
         if self._strikes[tracklet] >= STRIKES:
-            numbers = self.scene.tracklet
-            late = self.scene.recording.detections.pose >= pose
-            numbers[(numbers == tracklet) & late] = numbers.max() + 1
+            self.scene.cut_tracklet(tracklet, pose)
 
     def give_birth(self) -> None:
         """Start the objects that waiting boxes agree on."""
@@ -118,7 +118,7 @@ class Follower:
             for group in propose_groups(
                 recording, cameras, waiting, scene.tracklet, tracklets_only=self.final
             )
-            if len(group) > 1.25 * self._failed.get(tuple(group[:3].tolist()), 0)
+            if len(group) > 1.25 * self._failed.get(tuple(scene.box_name[group[:3]]), 0)
         ]
         if not groups:
             return
@@ -133,7 +133,7 @@ class Follower:
             if sure and fits.sum() >= FEWEST_VIEWS and fits.mean() >= LEAST_FIT:
                 scene.add_object(ellipsoid, group[fits])
             else:
-                self._failed[tuple(group[:3].tolist())] = len(group)
+                self._failed[tuple(scene.box_name[group[:3]])] = len(group)
 
 
 def _blur(recording: Recording, distance: float) -> float:

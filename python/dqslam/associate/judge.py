@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -137,8 +139,9 @@ def find_scattered(scene: SceneMap) -> dict[int, str]:
     owner = np.array([scene.object_of_tracklet.get(int(t), -1) for t in scene.tracklet])
     seen = scene.recording.detections.pose < len(scene.poses)
     scattered = {}
-    for number in np.flatnonzero(scene.box_counts > 0).tolist():
-        share = scene.box_counts[number] / np.sum(seen & (owner == number))
+    shown, counts = np.unique(scene.box_object[scene.box_object >= 0], return_counts=True)
+    for number, count in zip(shown.tolist(), counts.tolist(), strict=True):
+        share = count / np.sum(seen & (owner == number))
         if share < LEAST_FIT:
             scattered[number] = (
                 f"one place explains {share:.0%} of its boxes: it moved, or its id names several"
@@ -146,20 +149,21 @@ def find_scattered(scene: SceneMap) -> dict[int, str]:
     return scattered
 
 
-def find_movers(scene: SceneMap) -> dict[int, str]:
-    """Return objects that are at rest only if the path bends to them.
+def find_movers(scene: SceneMap, suspects: Collection[int] | None = None) -> dict[int, str]:
+    """Return objects, all or some ``suspects``, that are at rest only if the path bends to them.
 
     Each in turn is left out of the estimate. If it moved, its boxes do not fit any place then, and
     the cost that it causes, to the path and to the other objects as well, is gone. An object at
     rest may look the same as long as one that moved bends the path: the worst comes first, and the
     others are tried again without it.
     """
-    part = np.flatnonzero(scene.box_counts > 0)
-    part = part[~np.isin(part, list(scene.left_out))]
-    if len(part) < 2:  # nothing else tells the path
+    part, counts = np.unique(scene.box_object[scene.box_object >= 0], return_counts=True)
+    takes_part = ~np.isin(part, list(scene.left_out))
+    if takes_part.sum() < 2:  # nothing else tells the path
         return {}
-    alive = part[scene.box_counts[part] >= LEAST_BOXES].tolist()
-    fits = _fits_without(scene, alive, movers={})
+    asked = np.ones(len(part), dtype=bool) if suspects is None else np.isin(part, list(suspects))
+    alive = part[takes_part & asked & (counts >= LEAST_BOXES)].tolist()
+    fits = _fits_without(scene, alive, movers={}) if alive else {}
     movers: dict[int, str] = {}
     for number in sorted(fits, key=lambda one: -fits[one]):
         fit = _fits_without(scene, [number], movers).get(number) if movers else fits[number]

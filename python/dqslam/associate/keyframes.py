@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dqslam.associate.images import group_by_pose
-from dqslam.associate.rays import cameras_by_odometry, cast_rays
+from dqslam.associate.rays import Rays, cameras_by_odometry, cast_rays
 from dqslam.recording import Recording
 
 # A new viewpoint: objects are seen from directions this much apart [rad] ...
@@ -24,27 +24,45 @@ QUANTILE = 0.75
 KNOWN = 0.5
 
 
+class KeyframeChooser:
+    """Tells of one image after the other whether it is a keyframe."""
+
+    def __init__(self) -> None:
+        """Begin without a keyframe."""
+        self._direction: dict[int, NDArray[np.float64]] = {}
+        self._half_width: dict[int, float] = {}
+
+    def is_new(self, tracklet: NDArray[np.int64], rays: Rays) -> bool:
+        """Tell whether boxes of an image, of tracklets (b,), are seen from a new side.
+
+        They are when a quarter of the tracklets have moved by ``PARALLAX`` or grown by ``GROWTH``
+        since the last keyframe, or half of them are new. The image is a keyframe then.
+        """
+        numbers = tracklet.tolist()
+        known = [row for row, number in enumerate(numbers) if number in self._direction]
+        if known and len(known) >= KNOWN * len(numbers):
+            before = np.array([self._direction[numbers[row]] for row in known])
+            width = np.array([self._half_width[numbers[row]] for row in known])
+            cosine = np.sum(before * rays.direction[known], axis=1)
+            angle = np.arccos(np.clip(cosine, -1.0, 1.0))
+            growth = np.abs(np.log(rays.half_width[known] / width))
+            change = np.hypot(angle / PARALLAX, growth / np.log1p(GROWTH))
+            if np.quantile(change, QUANTILE) < 1.0:
+                return False
+        self._direction = dict(zip(numbers, rays.direction, strict=True))
+        self._half_width = dict(zip(numbers, rays.half_width.tolist(), strict=True))
+        return True
+
+
 def choose_keyframes(recording: Recording, tracklet: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return rows of poses, ascending, the first pose always among them.
 
-    An image is a keyframe when a quarter of the tracklets have moved by ``PARALLAX`` or grown by
-    ``GROWTH`` since the last keyframe, or half of them are new. ``tracklet`` is that of each box,
-    shape (m,).
+    ``tracklet`` is that of each box, shape (m,).
     """
-    detections = recording.detections
     rays = cast_rays(recording, cameras_by_odometry(recording))
+    chooser = KeyframeChooser()
     keyframes = [0]
-    seen: dict[int, int] = {}
-    for pose, rows in group_by_pose(detections.pose):
-        pairs = [(seen[t], row) for row in rows if (t := int(tracklet[row])) in seen]
-        if pairs and len(pairs) >= KNOWN * len(rows):
-            before, now = np.array(pairs).T
-            cosine = np.sum(rays.direction[before] * rays.direction[now], axis=1)
-            angle = np.arccos(np.clip(cosine, -1.0, 1.0))
-            growth = np.abs(np.log(rays.half_width[now] / rays.half_width[before]))
-            change = np.hypot(angle / PARALLAX, growth / np.log1p(GROWTH))
-            if np.quantile(change, QUANTILE) < 1.0:
-                continue
-        keyframes.append(pose)
-        seen = {int(tracklet[row]): row for row in rows}
+    for pose, rows in group_by_pose(recording.detections.pose):
+        if chooser.is_new(tracklet[rows], rays.select(rows)):
+            keyframes.append(pose)
     return np.unique(keyframes)

@@ -22,13 +22,23 @@ class Rays:
     half_width: NDArray[np.float64]
     """Half the side of the box, geometric mean, at a distance of 1 m along the ray, shape (m,)."""
 
+    def select(self, rows: NDArray[np.int64]) -> Rays:
+        """Return some of the rays."""
+        return Rays(self.origin[rows], self.direction[rows], self.half_width[rows])
+
 
 def cast_rays(recording: Recording, cameras: NDArray[np.float64]) -> Rays:
     """Return the ray of each box, from cameras world_from_camera (n, 7)."""
-    camera, detections = recording.camera, recording.detections
-    center = 0.5 * (detections.box[:, :2] + detections.box[:, 2:])
-    side = detections.box[:, 2:] - detections.box[:, :2]
-    seen_from = cameras[detections.pose]
+    detections = recording.detections
+    return rays_of_boxes(recording.camera, cameras[detections.pose], detections.box)
+
+
+def rays_of_boxes(
+    camera: _core.Camera, seen_from: NDArray[np.float64], box: NDArray[np.float64]
+) -> Rays:
+    """Return the rays of boxes (m, 4), each from its world_from_camera, (m, 7)."""
+    center = 0.5 * (box[:, :2] + box[:, 2:])
+    side = box[:, 2:] - box[:, :2]
     tip = _core.compose(_core.PoseModel.SE3, seen_from, points_at_depth_one(camera, center))
     ray = tip[:, :3] - seen_from[:, :3]
     length = np.linalg.norm(ray, axis=1)

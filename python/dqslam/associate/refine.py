@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dqslam.associate.births import FEWEST_VIEWS
 from dqslam.associate.follow import Follower, choose, predict
@@ -52,14 +53,9 @@ def reassign(scene: SceneMap, bonus: float) -> None:
     """Assign all boxes again, those that waited too, each image by itself."""
     detections = scene.recording.detections
     alive = np.flatnonzero(scene.box_counts > 0)
-    k = scene.recording.odometry.covariance.shape[1]
-    # What was uncertain has been fitted to these very boxes.
-    certain = np.zeros((k + 9 * len(alive),) * 2)
     found = np.full(len(detections), -1)
     for pose, rows in group_by_pose(detections.pose):
-        predicted = predict(scene, pose, alive, certain)
-        choice, margin = choose(scene, rows, alive, predicted, bonus)
-        found[rows] = np.where(margin >= AMBIGUOUS, choice, -1)
+        found[rows] = assign_afterwards(scene, pose, rows, alive, bonus)
     scene.release_all()
     scene.claim(np.arange(len(found)), found)
     claimed = np.flatnonzero(found >= 0)
@@ -68,3 +64,21 @@ def reassign(scene: SceneMap, bonus: float) -> None:
     )
     for row in np.argsort(counts, kind="stable"):  # the most frequent comes last, and stays
         scene.object_of_tracklet[int(pairs[row, 0])] = int(pairs[row, 1])
+
+
+def assign_afterwards(
+    scene: SceneMap,
+    pose: int,
+    rows: NDArray[np.int64],
+    objects: NDArray[np.int64],
+    bonus: float,
+) -> NDArray[np.int64]:
+    """Return the objects that the boxes of an image show, -1 for none, shape (b,).
+
+    The path and the objects have been fitted to these very boxes: they count as certain.
+    """
+    k = scene.recording.odometry.covariance.shape[1]
+    certain = np.zeros((k + 9 * len(objects),) * 2)
+    predicted = predict(scene, pose, objects, certain)
+    choice, margin = choose(scene, rows, objects, predicted, bonus)
+    return np.where(margin >= AMBIGUOUS, choice, -1)

@@ -22,6 +22,8 @@ from dqslam.size_prior import SizePrior, SizePriors
 ANY_SIZE = SizePrior(log_mean=float(np.log(0.3)), log_sigma=1.5)
 # Within a recording, logarithms of sizes spread by 0.3 to 0.65.
 LOG_SIZE_SIGMA = 0.7
+# Objects whose sizes tell that of others.
+ENOUGH_SIZES = 3
 
 
 class Outcome(NamedTuple):
@@ -47,6 +49,7 @@ class SceneMap:
         box_noise: BoxNoise,
         size_prior: SizePrior | SizePriors | None = None,
         step_noise: StepNoise | None = None,
+        odometry_noise: OdometryNoise | None = None,
         mode: _core.Mode = _core.Mode.SLAM,
     ) -> None:
         """Start at the first pose.
@@ -59,7 +62,7 @@ class SceneMap:
             By default it is learned from the objects found.
         step_noise
             By default the covariance of the recording's odometry is believed; else its level is
-            estimated.
+            estimated, from ``odometry_noise`` on.
         mode
             MAPPING takes the odometry for the truth.
         """
@@ -72,18 +75,26 @@ class SceneMap:
         self.learns_size = size_prior is None
         self.size_prior = ANY_SIZE if size_prior is None else size_prior
         self.step_noise = step_noise
-        self.odometry_noise = OdometryNoise()
+        self.odometry_noise = odometry_noise or OdometryNoise()
         self._believe_noise()
         self.classes = np.array(sorted(detections.class_names))
         self.box_class = np.searchsorted(self.classes, detections.class_id)
         self.poses = recording.odometry.first_pose[None]
         self.ellipsoids = np.zeros((0, 9))
         self.box_object = np.full(len(detections), -1)
+        self.box_name = np.arange(len(detections))
+        """What a box is called as long as the map lives, shape (m,)."""
+        self.free_tracklet = int(tracklet.max(initial=-1)) + 1
+        """Numbers from here on are free."""
         self.votes = np.zeros((0, len(self.classes)), dtype=np.int64)
         """How often each object was called each class, shape (o, c)."""
         self.object_of_tracklet: dict[int, int] = {}
         self.left_out: dict[int, str] = {}
         """Objects that take no part in the estimate, and why."""
+        self.joined: dict[int, int] = {}
+        """Objects that were given up for another, and for which."""
+        self.prior_covariance: dict[int, NDArray[np.float64]] = {}
+        """Of objects that were known before there were boxes, (9, 9)."""
 
     # ---- objects and their boxes
 
@@ -97,6 +108,18 @@ class SceneMap:
         rows, numbers = rows[numbers >= 0], numbers[numbers >= 0]
         self.box_object[rows] = numbers
         np.add.at(self.votes, (numbers, self.box_class[rows]), 1)
+
+    def release(self, rows: NDArray[np.int64]) -> None:
+        """Take boxes (b,) from their objects."""
+        rows = rows[self.box_object[rows] >= 0]
+        np.add.at(self.votes, (self.box_object[rows], self.box_class[rows]), -1)
+        self.box_object[rows] = -1
+
+    def cut_tracklet(self, tracklet: int, pose: int) -> None:
+        """Give the boxes of a tracklet from a pose on a number of their own."""
+        late = self.recording.detections.pose >= pose
+        self.tracklet[(self.tracklet == tracklet) & late] = self.free_tracklet
+        self.free_tracklet += 1
 
     def release_all(self) -> None:
         """Take all boxes from their objects, and forget which tracklet shows which."""
@@ -133,6 +156,7 @@ class SceneMap:
         self.box_object[self.box_object == given_up] = kept
         self.votes[kept] += self.votes[given_up]
         self.votes[given_up] = 0
+        self.joined[given_up] = kept
         for tracklet, number in self.object_of_tracklet.items():
             if number == given_up:
                 self.object_of_tracklet[tracklet] = kept
@@ -178,8 +202,12 @@ class SceneMap:
         solution = _core.solve(graph.core, options, self.state(graph))
         self.poses = solution.poses
         self.ellipsoids[graph.object_ids] = solution.landmarks
-        if self.learns_size and len(graph.object_ids) >= 3:
-            log_size = float(np.median(self.log_sizes()[graph.object_ids]))
+        self.learn_size(graph.object_ids)
+
+    def learn_size(self, objects: NDArray[np.int64]) -> None:
+        """Learn how large objects are from some of them, (o,), unless that was given."""
+        if self.learns_size and len(objects) >= ENOUGH_SIZES:
+            log_size = float(np.median(self.log_sizes()[objects]))
             self.size_prior = SizePrior(log_mean=log_size, log_sigma=LOG_SIZE_SIGMA)
 
     def cost(self, *, max_iterations: int, without: Collection[int] = ()) -> Outcome:
@@ -223,9 +251,22 @@ class SceneMap:
 
         Shapes (o,) and (k + 9 o, k + 9 o), the tangent of the pose first.
         """
-        k = self.recording.odometry.covariance.shape[1]
+        known = objects[np.isin(objects, list(self.prior_covariance))]
+        seen, covariance = self._covariance_of_seen(pose, np.setdiff1d(objects, known))
+        if not known.size:
+            return seen, covariance
+        from scipy.linalg import block_diag
+
+        # How such an object and the path are correlated is not kept.
+        priors = [self.prior_covariance[number] for number in known.tolist()]
+        return np.concatenate([seen, known]), block_diag(covariance, *priors)
+
+    def _covariance_of_seen(
+        self, pose: int, objects: NDArray[np.int64]
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         graph = self.graph(end=pose + 1)
         if graph is None:
+            k = self.recording.odometry.covariance.shape[1]
             return objects[:0], np.zeros((k, k))
         objects = objects[np.isin(objects, graph.object_ids)]
         rows = np.searchsorted(graph.object_ids, objects).tolist()

@@ -82,8 +82,17 @@ def fill_in(
 ) -> NDArray[np.float64]:
     """Return all poses (n, d) from those of the keyframes: odometry, its errors shared evenly."""
     odometry = recording.odometry
-    model = odometry.pose_model
-    path = _core.dead_reckon(model, odometry.first_pose, odometry.relative)
+    path = _core.dead_reckon(odometry.pose_model, odometry.first_pose, odometry.relative)
+    return bend_path(odometry.pose_model, path, keyframes, poses)
+
+
+def bend_path(
+    model: _core.PoseModel,
+    path: NDArray[np.float64],
+    keyframes: NDArray[np.int64],
+    poses: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return a path (n, d) bent so that its keyframes (f,) are at some poses (f, d)."""
     part = np.searchsorted(keyframes, np.arange(len(path)), side="right") - 1
     part = part.clip(min=0)
     first = keyframes[part]

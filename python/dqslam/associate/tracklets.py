@@ -35,15 +35,93 @@ class _Track:
     claim: int
     """Id that a tracker gave, -1 for none."""
     pose: int
+    camera: NDArray[np.float64]
+    """world_from_camera of that pose by odometry, shape (7,)."""
     box: NDArray[np.float64]
     drift: NDArray[np.float64] = field(default_factory=lambda: np.zeros(2))
     """Motion of the centre per image beside what the camera's turning explains, in pixels."""
 
-    def follow(self, pose: int, box: NDArray[np.float64], predicted: NDArray[np.float64]) -> None:
+    def follow(
+        self,
+        pose: int,
+        camera: NDArray[np.float64],
+        box: NDArray[np.float64],
+        predicted: NDArray[np.float64],
+    ) -> None:
         """Go on with a box, and learn from where it was predicted."""
         off = _centers(box) - _centers(predicted)
         self.drift = self.drift + 0.5 * off / (pose - self.pose)
-        self.pose, self.box = pose, box
+        self.pose, self.camera, self.box = pose, camera, box
+
+
+class Linker:
+    """Links the boxes of one image after the other.
+
+    The box of a track is predicted by the turn of the camera, which odometry knows well, and the
+    steady motion of the box beside it. Pairs of least distance are chosen over the whole image.
+    """
+
+    def __init__(self, camera: _core.Camera) -> None:
+        """Begin without tracks."""
+        self._camera = camera
+        self._tracks: list[_Track] = []
+        self._of_claim: dict[int, int] = {}
+        self.started = 0
+        """Numbers below this are taken."""
+
+    def link(
+        self,
+        pose: int,
+        camera: NDArray[np.float64],
+        box: NDArray[np.float64],
+        class_id: NDArray[np.int64],
+        claims: NDArray[np.int64],
+    ) -> NDArray[np.int64]:
+        """Return the number of the tracklet of each box of an image, shape (b,).
+
+        Parameters
+        ----------
+        pose
+            Row of the pose, above those before.
+        camera
+            world_from_camera by odometry, shape (7,).
+        box, class_id
+            Shapes (b, 4) and (b,).
+        claims
+            Ids (b,) that a tracker gave, -1 for none: all boxes of an id are one tracklet.
+        """
+        self._tracks = [track for track in self._tracks if pose - track.pose <= LONGEST_GAP]
+        tracklet = np.full(len(box), -1, dtype=np.int64)
+        predicted = _predict(self._tracks, pose, camera, self._camera)
+        own = np.array([(track.class_id, track.claim) for track in self._tracks]).reshape(-1, 2)
+        allowed = (own[:, None] == np.column_stack([class_id, claims])).all(axis=2)
+        for i, j in _match(predicted, box, allowed):
+            self._tracks[i].follow(pose, camera, box[j], predicted[i])
+            tracklet[j] = self._tracks[i].number
+        for j in np.flatnonzero(tracklet < 0).tolist():
+            claim = int(claims[j])
+            number = self._of_claim.get(claim)
+            if number is None:
+                number = self.new_number()
+            if claim >= 0:
+                self._of_claim[claim] = number
+            self._tracks.append(_Track(number, int(class_id[j]), claim, pose, camera, box[j]))
+            tracklet[j] = number
+        return tracklet
+
+    def new_number(self) -> int:
+        """Return a number that no tracklet has."""
+        self.started += 1
+        return self.started - 1
+
+    def cut(self, tracklet: int, number: int) -> None:
+        """Go on with a tracklet under another number."""
+        for track in self._tracks:
+            if track.number == tracklet:
+                track.number = number
+        for claim, own in self._of_claim.items():
+            if own == tracklet:
+                self._of_claim[claim] = number
 
 
 def link_tracklets(
@@ -51,35 +129,18 @@ def link_tracklets(
 ) -> NDArray[np.int64]:
     """Return the number of the tracklet of each box, shape (m,), in order of their first boxes.
 
-    The box of a track is predicted by the turn of the camera, which odometry knows well, and the
-    steady motion of the box beside it. Pairs of least distance are chosen over the whole image.
-
-    Parameters
-    ----------
-    claims
-        Ids (m,) that a tracker gave, -1 for none: all boxes of an id are one tracklet.
+    ``claims`` are the ids (m,) that a tracker gave, -1 for none: all boxes of an id are one
+    tracklet.
     """
-    detections, camera = recording.detections, recording.camera
+    detections = recording.detections
     cameras = cameras_by_odometry(recording)
     claims = np.full(len(detections), -1) if claims is None else claims
     tracklet = np.full(len(detections), -1, dtype=np.int64)
-    tracks: list[_Track] = []
-    started = 0
+    linker = Linker(recording.camera)
     for pose, rows in group_by_pose(detections.pose):
-        tracks = [track for track in tracks if pose - track.pose <= LONGEST_GAP]
-        predicted = _predict(tracks, pose, cameras, camera)
-        box, class_id = detections.box[rows], detections.class_id[rows]
-        own = np.array([(track.class_id, track.claim) for track in tracks]).reshape(-1, 2)
-        allowed = (own[:, None] == np.column_stack([class_id, claims[rows]])).all(axis=2)
-        for i, j in _match(predicted, box, allowed):
-            tracks[i].follow(pose, box[j], predicted[i])
-            tracklet[rows[j]] = tracks[i].number
-        for j in np.flatnonzero(tracklet[rows] < 0).tolist():
-            tracks.append(_Track(started, int(class_id[j]), int(claims[rows[j]]), pose, box[j]))
-            tracklet[rows[j]] = started
-            started += 1
-    for claim in np.unique(claims[claims >= 0]).tolist():
-        tracklet[claims == claim] = tracklet[claims == claim].min()
+        tracklet[rows] = linker.link(
+            pose, cameras[pose], detections.box[rows], detections.class_id[rows], claims[rows]
+        )
     return np.asarray(np.unique(tracklet, return_inverse=True)[1])
 
 
@@ -88,7 +149,7 @@ def _centers(box: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _predict(
-    tracks: list[_Track], pose: int, cameras: NDArray[np.float64], camera: _core.Camera
+    tracks: list[_Track], pose: int, seen_from: NDArray[np.float64], camera: _core.Camera
 ) -> NDArray[np.float64]:
     """Return where the boxes of tracks are expected in the image of a pose, shape (t, 4)."""
     if not tracks:
@@ -96,9 +157,9 @@ def _predict(
     box = np.array([track.box for track in tracks])
     last = np.array([track.pose for track in tracks])
     drift = np.array([track.drift for track in tracks])
-    turns = cameras[last]
+    turns = np.array([track.camera for track in tracks])
     turns[:, :3] = 0.0
-    here = np.repeat(cameras[pose : pose + 1], len(box), axis=0)
+    here = np.repeat(seen_from[None], len(box), axis=0)
     here[:, :3] = 0.0
     se3 = _core.PoseModel.SE3
     far = _core.compose(se3, turns, points_at_depth_one(camera, _centers(box)))
