@@ -123,6 +123,8 @@ def run(
     if online and (mode == "mapping" or hold_out):
         raise ValueError("--online: goes neither with --mode mapping nor with --hold-out")
     final = trust_ids == 1.0 and ids != "none"
+    trust = 1.0 if final else min(trust_ids, UNSURE)
+    estimates_noise = believed is None and odometry_covariance is None
     names = io.split_formats(formats or [])
     frames = io.choose_frame_times(odometry, detections, names, times=frame_times, rate=frame_rate)
     reference, reference_name = None, None
@@ -155,19 +157,20 @@ def run(
 
             result = run_online(
                 recording,
-                final_ids=final,
+                trust_ids=trust,
                 reference=reference,
                 size_prior=sizes,
+                estimates_noise=estimates_noise,
                 show=lambda slam, frame: progress(describe_step(slam, frame)),
             )
         else:
             result = run_recording.run(
                 recording,
-                trust_ids=1.0 if final else min(trust_ids, UNSURE),
+                trust_ids=trust,
                 mode=_core.Mode[mode.upper()],
                 reference=reference,
                 size_prior=sizes,
-                estimates_noise=believed is None and odometry_covariance is None,
+                estimates_noise=estimates_noise,
                 hold_out=hold_out,
                 seed=seed,
                 progress=progress,

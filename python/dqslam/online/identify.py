@@ -1,8 +1,9 @@
-"""Which object a box shows, where nothing but the map tells: gating against it, step by step.
+"""Which objects the boxes of a session show, where ids do not tell, or not for sure.
 
-A box is given to an object of the map if it clearly shows it, by the gate and the costs that the
-association of whole recordings has; other boxes wait in tracklets, linked by their overlap in the
-image, and become an object when a tracklet is long enough.
+The association of whole recordings, step by step: boxes are linked to tracklets, keyframes are
+chosen, and at each of them the boxes are given to the objects that they clearly show, by the joint
+covariance that the last keyframes leave; others wait, in the session too, until an object is born
+from them. ``SceneMap`` and ``Follower`` do this here as they do there, on a part of the path.
 """
 
 from __future__ import annotations
@@ -12,132 +13,204 @@ from dataclasses import dataclass
 import numpy as np
 
 from dqslam import _core
-from dqslam._checks import Floats, Ints
-from dqslam.associate.assignment import assign
-from dqslam.associate.gating import pair_costs, predict_boxes
-from dqslam.evaluate import box_iou
+from dqslam._checks import Bools, Floats, Ints
+from dqslam.associate import FINAL
+from dqslam.associate.follow import FIRST_NOISE, Follower
+from dqslam.associate.judge import find_misfits, find_movers, find_scattered, join_duplicates
+from dqslam.associate.keyframes import KeyframeChooser
+from dqslam.associate.rays import rays_of_boxes
+from dqslam.associate.refine import assign_afterwards
+from dqslam.associate.tracklets import Linker
+from dqslam.online.journal import Journal, Keyframe
+from dqslam.online.leg import Leg
 from dqslam.online.objects import Registry
-from dqslam.online.step import CheckedBoxes
-from dqslam.problem import BoxNoise
+from dqslam.online.part import Assumptions, Part, cut_part
+from dqslam.online.reach import Reach
+from dqslam.online.refinement import Refinement
+from dqslam.online.tell import tell
 
-# -2 ln of the odds, 20 to 1: what is less clear waits.
-CLEAR = 6.0
-# Of the box before in its tracklet.
-LEAST_OVERLAP = 0.3
-# Boxes of a tracklet before it becomes an object: a false alarm lasts no longer.
-BIRTH = 3
-# How well the map is known, beside the motion of one step: sigmas of the centre [m] and of the
-# shape. The window does not keep joint covariances.
-_CENTER_SIGMA_M, _SHAPE_SIGMA = 0.1, 0.1
-_WRONG_CLASS = 0.02
+# Keyframes whose poses are minimised when the boxes of the last one have found their objects.
+RECENT = 10
+ITERATIONS = 2
+# The boxes of a keyframe are assigned again when there are so many newer ones.
+AGAIN = 10
+# Keyframes between two looks at the level of the noise, at sizes and at duplicates.
+JUDGE_EVERY = 5
+# Keyframes without a box of an object, until it is asked whether it has moved.
+DEPARTED = 3
 
 
-@dataclass
-class Track:
-    """Boxes that follow each other."""
+@dataclass(frozen=True, eq=False)
+class NewBoxes:
+    """Boxes of the last step, whose objects are not known."""
 
-    number: int
-    """Object, or -1 while it waits."""
+    row: Ints
+    """Of the boxes of the step, shape (b,)."""
+    sight: Ints
+    """Rows in the session, shape (b,)."""
     box: Floats
-    length: int
+    truncated: Bools
+    class_name: list[str]
+    claim: Ints
+    """Ids that a tracker gave, -1 for none."""
 
 
 class Identifier:
-    """Gives boxes of unknown objects to objects."""
+    """Follows a session, keyframe by keyframe."""
 
-    def __init__(self, camera: _core.Camera, pose_model: _core.PoseModel) -> None:
-        """Begin without tracks."""
-        self._camera = camera
-        self._pose_model = pose_model
-        self.tracks: list[Track] = []
+    def __init__(self, assumptions: Assumptions, journal: Journal, *, trust: float) -> None:
+        """``trust`` is the probability that an id stays with its object."""
+        camera, pose_model = assumptions.camera, assumptions.pose_model
+        self._assumptions = assumptions
+        self._camera, self._pose_model = camera, pose_model
+        self._journal = journal
+        self._trust = trust
+        self._linker = Linker(camera)
+        self._chooser = KeyframeChooser()
+        self._reach = Reach(camera, pose_model)
+        self._follower: Follower | None = None
+        self._misfits: set[int] = set()
+        self._leg = Leg.of_no_steps(pose_model)
+        self._path_end = self._leg.relative  # by odometry, from where this began
 
-    def identify(
-        self,
-        session: _core.Session,
-        registry: Registry,
-        boxes: CheckedBoxes,
-        relative: Floats,
-        motion_covariance: Floats,
-        noise: BoxNoise,
-    ) -> tuple[Ints, list[Track]]:
-        """Return the object of each box (b,), -1 for one that waits, and what to follow next.
+    @property
+    def has_begun(self) -> bool:
+        """Whether there have been boxes that no id told the objects of."""
+        return bool(self._journal.keyframes)
 
-        Nothing changes until `tracks` is set: the step may yet be refused.
-        """
-        chosen = self._by_map(session, registry, boxes, relative, motion_covariance, noise)
-        taken = set(chosen[chosen >= 0].tolist())
-        next_id = registry.next_id()
-        waiting = list(self.tracks)
-        tracks = []
-        for row in range(len(boxes.ids)):
-            track = _take_track(waiting, boxes.box[row])
-            length = 1 if track is None else track.length + 1
-            number = boxes.ids[row] if boxes.ids[row] >= 0 else int(chosen[row])
-            if number < 0 and track is not None and track.number >= 0:
-                number = track.number if track.number not in taken else -1
-            if number < 0 and length >= BIRTH:
-                number, next_id = next_id, next_id + 1
-            if number >= 0:
-                taken.add(number)
-            chosen[row] = number
-            tracks.append(Track(number, boxes.box[row], length))
-        return chosen, tracks
+    def polish(
+        self, session: _core.Session, registry: Registry, options: _core.SolveOptions
+    ) -> Refinement:
+        """Make a polish of all keyframes."""
+        part = self._part(session, 0)
+        return Refinement(part, self._journal, registry, session, options, trust=self._trust)
 
-    def _by_map(
-        self,
-        session: _core.Session,
-        registry: Registry,
-        boxes: CheckedBoxes,
-        relative: Floats,
-        motion_covariance: Floats,
-        noise: BoxNoise,
+    def go_on(self, relative: Floats, covariance: Floats) -> None:
+        """Take a step without looking; not the first."""
+        self._leg = self._leg.then(self._pose_model, relative, covariance)
+        self._path_end = _core.compose(self._pose_model, self._path_end[None], relative[None])[0]
+
+    def look(
+        self, session: _core.Session, registry: Registry, timestamp: float, boxes: NewBoxes
     ) -> Ints:
-        """Return the object that each box clearly shows by the map, -1 for none; shape (b,)."""
-        chosen = np.full(len(boxes.ids), -1)
-        count = session.num_objects
-        if not count or not session.num_poses:
-            return chosen
-        last = session.pose_at(session.num_poses - 1)
-        pose = _core.compose(self._pose_model, last[None], relative[None])[0]
-        near = np.arange(count)
-        ellipsoids = session.ellipsoids
-        _, in_front = _core.project_to_boxes(
-            self._pose_model, self._camera, np.repeat(pose[None], count, axis=0), ellipsoids
+        """Return the row of the object that each box of the last step shows, -1 for none; (b,)."""
+        journal = self._journal
+        pose = session.num_poses - 1
+        seen_from = _core.world_from_camera(self._pose_model, self._camera, self._path_end[None])
+        class_id = journal.class_ids(boxes.class_name)
+        tracklet = self._linker.link(pose, seen_from[0], boxes.box, class_id, boxes.claim)
+        journal.remember(pose, boxes.row, tracklet)
+        rays = rays_of_boxes(self._camera, np.repeat(seen_from, len(boxes.box), axis=0), boxes.box)
+        if not self._chooser.is_new(tracklet, rays):
+            known = [journal.object_of_tracklet.get(number, -1) for number in tracklet.tolist()]
+            return np.array(known, dtype=np.int64)
+        frame = Keyframe(
+            pose=pose,
+            timestamp=timestamp,
+            leg=self._leg,
+            sight=boxes.sight,
+            box=boxes.box,
+            truncated=boxes.truncated,
+            class_id=class_id,
+            claim=boxes.claim,
+            tracklet=tracklet,
+            object=np.full(len(tracklet), -1),
         )
-        near = near[in_front]
-        if not near.size:
-            return chosen
-        k = 3 if self._pose_model == _core.PoseModel.SE2 else 6
-        own = [_CENTER_SIGMA_M] * 3 + [_SHAPE_SIGMA] * 6
-        sigma = np.concatenate([np.zeros(k), np.tile(own, len(near))])
-        joint = np.diag(sigma**2)
-        joint[:k, :k] = motion_covariance
-        predicted = predict_boxes(self._camera, self._pose_model, pose, ellipsoids[near], joint)
-        shown = near[predicted.object_row]
-        if not shown.size:
-            return chosen
-        names = registry.class_names()
-        probability = np.array(
-            [
-                [1.0 if names[row] == name else _WRONG_CLASS for row in shown]
-                for name in boxes.class_name
-            ]
-        )
-        covariance = noise.covariance(boxes.box)
-        costs = pair_costs(
-            self._camera, predicted, boxes.box, covariance, boxes.truncated, probability
-        )
-        column, margin = assign(costs.cost, costs.null)
-        clear = (column >= 0) & (margin >= CLEAR)
-        ids = np.array(registry.ids)
-        chosen[clear] = ids[shown[column[clear]]]
-        return chosen
+        self._leg = Leg.of_no_steps(self._pose_model)
+        journal.add_keyframe(frame)
+        if len(journal.keyframes) > 1:
+            self._identify(session, registry)
+        return frame.object
 
+    def _identify(self, session: _core.Session, registry: Registry) -> None:
+        """Find the objects of the last keyframe's boxes, and what else these tell."""
+        begin = self._reach.begin(self._journal, session)
+        part = self._part(session, begin)
+        follower = self._follow(part)
+        last = len(part.scene.poses) - 1
+        part.scene.poses = part.scene.poses[:last]  # the last one by odometry alone
+        follower.assign_ahead(last, last + 1)
+        self._cut_tracks(part)
+        self._tell(session, registry, part)
+        session.smooth(ITERATIONS, begin=self._journal.keyframes[-RECENT:][0].pose)
+        self._refresh(session, part)
+        follower.give_birth()
+        self._assign_again(part)
+        if len(self._journal.keyframes) % JUDGE_EVERY == 0:
+            self._judge(part)
+        self._tell(session, registry, part)
 
-def _take_track(tracks: list[Track], box: Floats) -> Track | None:
-    """Take out the track whose last box overlaps this one most."""
-    if not tracks:
-        return None
-    overlap = box_iou(np.array([track.box for track in tracks]), box)
-    best = int(np.argmax(overlap))
-    return tracks.pop(best) if overlap[best] >= LEAST_OVERLAP else None
+    def _part(self, session: _core.Session, begin: int) -> Part:
+        return cut_part(
+            self._journal, self._assumptions, session, begin, free_tracklet=self._linker.started
+        )
+
+    def _follow(self, part: Part) -> Follower:
+        if self._follower is None:
+            self._follower = Follower(part.scene, trust=self._trust)
+        self._follower.scene = part.scene
+        return self._follower
+
+    def _cut_tracks(self, part: Part) -> None:
+        """Let tracks go on under the numbers that their tracklets have now."""
+        now = part.scene.tracklet[-len(self._journal.keyframes[-1].tracklet) :]
+        for before, number in zip(self._journal.keyframes[-1].tracklet, now, strict=True):
+            if before != number:
+                self._linker.cut(int(before), int(number))
+        self._linker.started = part.scene.free_tracklet
+
+    def _refresh(self, session: _core.Session, part: Part) -> None:
+        frames = self._journal.keyframes[part.begin :]
+        part.scene.poses = session.poses_at([frame.pose for frame in frames])
+        part.scene.ellipsoids = session.ellipsoids
+
+    def _tell(self, session: _core.Session, registry: Registry, part: Part) -> None:
+        final = self._trust == FINAL
+        tell(part, self._journal, registry, session, ids_are_final=final)
+
+    def _assign_again(self, part: Part) -> None:
+        """Assign the boxes of an older keyframe: more is known now."""
+        scene = part.scene
+        pose = len(scene.poses) - 1 - AGAIN
+        rows = np.flatnonzero(scene.recording.detections.pose == pose)
+        if not rows.size:
+            return
+        near = np.unique(scene.box_object[scene.box_object >= 0])
+        found = assign_afterwards(scene, pose, rows, near, self._follower_bonus())
+        scene.release(rows)
+        scene.claim(rows, found)
+        for row in rows[found >= 0].tolist():
+            scene.object_of_tracklet.setdefault(
+                int(scene.tracklet[row]), int(scene.box_object[row])
+            )
+
+    def _follower_bonus(self) -> float:
+        assert self._follower is not None
+        return self._follower.bonus
+
+    def _judge(self, part: Part) -> None:
+        """Look at the level of the noise, and at objects that are one, or move."""
+        scene = part.scene
+        near = np.unique(scene.box_object[scene.box_object >= 0])
+        scene.learn_size(near)
+        final = self._trust == FINAL
+        if not final:
+            join_duplicates(scene)
+        # Sizes are looked at again; what has moved has moved.
+        stays = {row: why for row, why in scene.left_out.items() if row not in self._misfits}
+        misfits = find_misfits(scene)
+        self._misfits = set(misfits)
+        scene.left_out = misfits | stays
+        departed = [number for number in near.tolist() if self._has_departed(number)]
+        scene.left_out |= find_movers(scene, departed)
+        if final:
+            scattered = find_scattered(scene)
+            scene.left_out |= {row: scattered[row] for row in departed if row in scattered}
+        if len(scene.poses) >= FIRST_NOISE:
+            scene.estimate_noise()
+
+    def _has_departed(self, number: int) -> bool:
+        """Tell whether an object has gone out of view since the last judgement."""
+        seen = self._journal.keyframes_of(number)
+        absent = len(self._journal.keyframes) - 1 - seen[-1] if seen else 0
+        return DEPARTED <= absent < DEPARTED + JUDGE_EVERY

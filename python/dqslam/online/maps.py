@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -146,17 +146,14 @@ def object_covariances(
 
 
 def save_session(
-    slam: OnlineSlam,
-    session: _core.Session,
-    ids: Sequence[int],
-    covariances: Mapping[int, Floats],
-    directory: str | Path,
+    slam: OnlineSlam, covariances: Mapping[int, Floats], directory: str | Path
 ) -> None:
-    """Write the estimate with the covariances of its objects, by row of the session."""
+    """Write the estimate with the covariances of its objects, by id."""
     estimate = slam.estimate()
-    order = np.argsort(np.array(ids, dtype=np.int64), kind="stable")
     unknown = np.full((9, 9), np.nan)
-    objects = np.array([covariances.get(int(row), unknown) for row in order]).reshape(-1, 9, 9)
+    objects = np.array(
+        [covariances.get(number, unknown) for number in estimate.object_ids.tolist()]
+    )
     k = 3 if slam.pose_model == _core.PoseModel.SE2 else 6
     poses = np.full((len(estimate.poses), k, k), np.nan)
-    save_estimate(estimate, directory, marginals=_Covariances(poses, objects))
+    save_estimate(estimate, directory, marginals=_Covariances(poses, objects.reshape(-1, 9, 9)))

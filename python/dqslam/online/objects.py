@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from dqslam._checks import Floats, Ints
@@ -42,7 +42,7 @@ class Registry:
         self.votes: list[Counter[str]] = []
         self.priors: list[SizePrior] = []
         self._row: dict[int, int] = {}
-        self._size_prior = SizePrior() if size_prior is None else size_prior
+        self.size_prior = SizePrior() if size_prior is None else size_prior
 
     def __contains__(self, number: int) -> bool:
         """Tell whether an object has this id."""
@@ -75,7 +75,7 @@ class Registry:
 
     def prior_of(self, name: str) -> SizePrior:
         """Return the size prior of a class."""
-        given = self._size_prior
+        given = self.size_prior
         return given.of(name) if isinstance(given, SizePriors) else given
 
     def register(self, new: Sequence[tuple[int, SizePrior]]) -> None:
@@ -85,6 +85,18 @@ class Registry:
             self.ids.append(number)
             self.votes.append(Counter())
             self.priors.append(prior)
+
+    def take(
+        self, votes: Mapping[int, Counter[str]], ids: Sequence[int], priors: Sequence[SizePrior]
+    ) -> None:
+        """Take over how often objects were called what, by row.
+
+        New ones have ids, -1 where any will do, and size priors.
+        """
+        for number, prior in zip(ids, priors, strict=True):
+            self.register([(number if number >= 0 else self.next_id(), prior)])
+        for row, counts in votes.items():
+            self.votes[row] = counts
 
     def class_names(self) -> tuple[str, ...]:
         """Return the class of each object: the one most of its boxes have."""

@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from concurrent.futures import Future
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dqslam import _core
-from dqslam._checks import Floats, Ints, as_covariances
+from dqslam._checks import Floats, Ints
+from dqslam.associate import FINAL, UNSURE
 from dqslam.estimate import Estimate
-from dqslam.online.identify import Identifier
+from dqslam.io import OdometryNoise
+from dqslam.online.identify import Identifier, NewBoxes
+from dqslam.online.inputs import PathBegin, box_noise_rows, motion_arrays, next_time, position_rows
+from dqslam.online.journal import Journal
 from dqslam.online.objects import Objects, Registry
-from dqslam.online.polish import Polished, polish_session, start_polish
+from dqslam.online.part import Assumptions
+from dqslam.online.polish import Polish, Polished, Polisher, Smoothing, Solve
 from dqslam.online.relocalise import Relocation, relocalise
 from dqslam.online.step import (
+    CheckedBoxes,
     Motion,
     StepBoxes,
     StepError,
@@ -25,14 +30,9 @@ from dqslam.online.step import (
     check_boxes,
 )
 from dqslam.problem import BoxNoise
-from dqslam.recording import as_poses, pose_size, tangent_size
 from dqslam.size_prior import SizePrior, SizePriors
 
-Int32s = NDArray[np.int32]
-
-_NO_ROWS = np.zeros(0, dtype=np.int32)
 _NO_FLOATS = np.zeros(0)
-_NO_POSITIONS = (_NO_ROWS, np.zeros((0, 3)), np.zeros((0, 9)))
 
 
 class OnlineSlam:
@@ -57,6 +57,15 @@ class OnlineSlam:
         default none: it is exact.
     box_noise, size_prior, scene_priors
         What is assumed, as ``build_graph`` has it.
+    trust_ids
+        The probability that an id stays with its object; 1 takes ids for final. Below, and for
+        boxes without ids, boxes find their objects as ``associate`` has it.
+    finds_movers
+        Whether objects whose ids are final must show that they are at rest, too: their boxes wait
+        for four views, and objects that move are left out.
+    estimates_noise
+        Whether the level of the odometry's noise is estimated from such boxes, and the covariances
+        of the steps are not believed.
     """
 
     def __init__(
@@ -71,6 +80,9 @@ class OnlineSlam:
         box_noise: BoxNoise | None = None,
         size_prior: SizePrior | SizePriors | None = None,
         scene_priors: _core.ScenePriors | None = None,
+        trust_ids: float = FINAL,
+        finds_movers: bool = False,
+        estimates_noise: bool = False,
     ) -> None:
         """Begin a session without a step."""
         self.camera = camera
@@ -86,22 +98,27 @@ class OnlineSlam:
         self._registry = Registry(size_prior)
         self._box_noise = BoxNoise() if box_noise is None else box_noise
         self._timestamps: list[float] = []
-        origin = np.zeros(pose_size(pose_model))
-        if pose_model == _core.PoseModel.SE3:
-            origin[-1] = 1.0
-        given = origin if first_pose is None else first_pose
-        self._first_pose = as_poses("first_pose", np.atleast_2d(given), pose_model)[0]
-        self._first_covariance = np.zeros((0, 0))
-        if first_covariance is not None:
-            k = tangent_size(pose_model)
-            covariance = np.asarray(first_covariance, dtype=np.float64)[None]
-            self._first_covariance = as_covariances("first_covariance", covariance, 1, k)[0]
+        self._begin = PathBegin(pose_model, first_pose, first_covariance)
         self.shown: Ints = np.zeros(0, dtype=np.int64)
         """Object that each box of the last step was given, -1 for one that waits; shape (b,)."""
-        self._pending: Future[Polished] | None = None
+        self._ids: list[Ints] = []
+        self._polisher = Polisher()
         self._map_rows = 0
         self._map_covariance: dict[int, Floats] = {}
-        self._identifier = Identifier(camera, pose_model)
+        if not 0.5 < trust_ids <= FINAL:
+            raise ValueError(f"trust in ids is {trust_ids:g}, not above 0.5 and at most 1")
+        self._believes_ids = trust_ids == FINAL and not finds_movers
+        self._estimates_noise = estimates_noise
+        self._journal = Journal(size_prior)
+        assumptions = Assumptions(
+            camera,
+            pose_model,
+            self._box_noise,
+            learns_size=size_prior is None,
+            estimates_noise=estimates_noise,
+        )
+        trust = FINAL if trust_ids == FINAL and finds_movers else min(trust_ids, UNSURE)
+        self._identifier = Identifier(assumptions, self._journal, trust=trust)
 
     # ------------------------------------------------------------------------------ steps
 
@@ -131,94 +148,76 @@ class OnlineSlam:
             For a time that does not increase, a step without odometry, numbers that are not finite
             and boxes that are none. Nothing has changed then.
         """
-        self._take_polished()
+        self._polisher.take()
         count = len(self._timestamps)
         try:
-            tracks = None
-            time = self._time(timestamp)
+            time = next_time(self._timestamps[-1] if count else None, timestamp)
             checked = check_boxes(boxes)
-            relative, covariance = self._motion(odometry)
-            shown = checked.object_id
-            if checked.ids and min(checked.ids) < 0:
-                shown, tracks = self._identifier.identify(
-                    self._session,
-                    self._registry,
-                    checked,
-                    relative,
-                    covariance,
-                    self._box_noise,
-                )
-                checked = checked.select(shown)
-            rows, new = self._registry.rows(checked.ids, checked.class_name)
+            relative, covariance = motion_arrays(
+                odometry,
+                None if count else self._begin,
+                self._step_covariance(),
+            )
+            shows = checked.object_id if self._believes_ids else np.full(len(checked.box), -1)
+            known = np.flatnonzero(shows >= 0)
+            ids = shows[known].tolist()
+            names = [checked.class_name[row] for row in known.tolist()]
+            rows, new = self._registry.rows(ids, names)
+            objects = np.full(len(shows), -1, dtype=np.int32)
+            objects[known] = rows
             report = self._session.add(
                 relative,
                 covariance,
-                np.array(rows, dtype=np.int32),
+                objects,
                 checked.box,
-                self._box_noise_rows(checked.box),
+                box_noise_rows(self._box_noise, checked.box),
                 checked.truncated,
-                *self._position_rows(positions),
+                *position_rows(positions, self._registry),
                 np.array([prior.log_mean for _, prior in new]) if new else _NO_FLOATS,
                 np.array([prior.log_sigma for _, prior in new]) if new else _NO_FLOATS,
             )
         except (ValueError, TypeError) as error:
             raise StepError(f"step {count}: {error}") from None
-        if tracks is not None:
-            self._identifier.tracks = tracks
-        self.shown = shown
         self._registry.register(new)
-        for row, name in zip(rows, checked.class_name, strict=True):
+        for row, name in zip(rows, names, strict=True):
             self._registry.votes[row][name] += 1
         self._timestamps.append(time)
+        self.shown = checked.object_id
+        self._ids.append(checked.object_id)
+        if self._identifier.has_begun and count:
+            self._identifier.go_on(relative, covariance)
+        if len(ids) < len(objects):
+            unknown = np.flatnonzero(objects < 0)
+            objects[unknown] = self._identify(checked, unknown, report.first_sight)
+            names_of = self._registry.ids
+            self.shown = np.array(
+                [names_of[row] if row >= 0 else -1 for row in objects.tolist()], dtype=np.int64
+            )
         return report
 
-    def _time(self, timestamp: float | None) -> float:
-        last = self._timestamps[-1] if self._timestamps else None
-        if timestamp is None:
-            return 0.0 if last is None else last + 1.0
-        time = float(timestamp)
-        if not math.isfinite(time):
-            raise ValueError(f"timestamp {time} is not finite")
-        if last is not None and time <= last:
-            word = "repeats the last one" if time == last else f"is before the last, {last!r}"
-            raise ValueError(f"timestamp {time!r} {word}")
-        return time
+    def _step_covariance(self) -> Floats | None:
+        """Return the covariance that is estimated of a step, (k, k), if it is."""
+        noise = self.odometry_noise
+        if noise is None:
+            return None
+        axes = (2, 1) if self.pose_model == _core.PoseModel.SE2 else (3, 3)
+        return np.diag(np.repeat([noise.translation_m**2, noise.rotation_rad**2], axes))
 
-    def _motion(self, odometry: Motion | None) -> tuple[Floats, Floats]:
-        if not self._timestamps:
-            if odometry is not None:
-                raise ValueError("the first step has no odometry: it is where the path begins")
-            return self._first_pose, self._first_covariance
-        if odometry is None:
-            raise ValueError(
-                "no odometry leads here; across a gap, give a guess and a covariance as wide"
-            )
-        return (
-            np.asarray(odometry.relative, dtype=np.float64),
-            np.asarray(odometry.covariance, dtype=np.float64),
+    def _identify(self, boxes: CheckedBoxes, rows: Ints, first_sight: int) -> Ints:
+        """Return the rows of the objects that boxes show, -1 for none, shape (b,)."""
+        return self._identifier.look(
+            self._session,
+            self._registry,
+            self._timestamps[-1],
+            NewBoxes(
+                row=rows,
+                sight=first_sight + rows,
+                box=boxes.box[rows],
+                truncated=boxes.truncated[rows],
+                class_name=[boxes.class_name[row] for row in rows.tolist()],
+                claim=boxes.object_id[rows],
+            ),
         )
-
-    def _box_noise_rows(self, box: Floats) -> Floats:
-        """Return the covariances of boxes (b, 4), shape (b, 16)."""
-        rows = np.zeros((len(box), 16))
-        if len(box):
-            if self._box_noise.relative:
-                side = np.tile(box[:, 2:] - box[:, :2], 2)
-                rows[:, ::5] = self._box_noise.pixels**2 + (self._box_noise.relative * side) ** 2
-            else:
-                rows[:, ::5] = self._box_noise.pixels**2
-        return rows
-
-    def _position_rows(self, positions: StepPositions | None) -> tuple[Int32s, Floats, Floats]:
-        if positions is None:
-            return _NO_POSITIONS
-        ids = np.asarray(positions.object_id).tolist()
-        unknown = [number for number in ids if number not in self._registry]
-        if unknown:
-            raise ValueError(f"positions: no box has shown object {unknown[0]} yet")
-        rows = np.array([self._registry.row_of(number) for number in ids], dtype=np.int32)
-        covariance = np.asarray(positions.covariance, dtype=np.float64).reshape(len(ids), 9)
-        return rows, np.asarray(positions.object_in_robot, dtype=np.float64), covariance
 
     # ------------------------------------------------------------------------------ estimate
 
@@ -230,7 +229,7 @@ class OnlineSlam:
     def pose(self) -> Floats:
         """world_from_robot now, shape (d,); the first pose before any step."""
         if not self._timestamps:
-            return np.asarray(self._first_pose)
+            return np.asarray(self._begin.pose)
         return np.asarray(self._session.pose_at(len(self._timestamps) - 1))
 
     @property
@@ -246,17 +245,54 @@ class OnlineSlam:
     @property
     def count(self) -> int:
         """How many objects there are."""
-        return int(self._session.num_objects)
+        return int(self._session.num_objects) - len(self._journal.hidden())
+
+    def _rows(self) -> list[int]:
+        """Return the rows of the objects that are in the map."""
+        hidden = self._journal.hidden()
+        return [row for row in range(self._session.num_objects) if row not in hidden]
 
     @property
     def objects(self) -> Objects:
         """The objects as they stand."""
+        rows = self._rows()
+        names = self._registry.class_names()
         return Objects(
-            ids=np.array(self._registry.ids, dtype=np.int64),
-            class_names=self._registry.class_names(),
-            ellipsoids=self._session.ellipsoids,
-            observations=self._session.observations.astype(np.int64),
+            ids=np.array([self._registry.ids[row] for row in rows], dtype=np.int64),
+            class_names=tuple(names[row] for row in rows),
+            ellipsoids=self._session.ellipsoids[rows],
+            observations=self._session.observations[rows].astype(np.int64),
         )
+
+    @property
+    def left_out(self) -> dict[int, str]:
+        """Ids of objects that do not fit a world at rest, and why; their boxes take no part."""
+        return {self._registry.ids[row]: why for row, why in self._journal.left_out.items()}
+
+    @property
+    def assignments(self) -> list[Ints]:
+        """Which object each box of each step shows, as far as is known now; -1 for none."""
+        ids = np.array([*self._registry.ids, -1], dtype=np.int64)
+        shown = list(self._ids)
+        for step, (boxes, rows) in self._journal.shown().items():
+            shown[step] = shown[step].copy()
+            shown[step][boxes] = ids[rows]
+        return shown
+
+    @property
+    def keyframes(self) -> Ints:
+        """Steps whose boxes take part, of boxes that no id tells the object of; shape (f,)."""
+        return np.array([frame.pose for frame in self._journal.keyframes], dtype=np.int64)
+
+    @property
+    def size_prior(self) -> SizePrior | SizePriors:
+        """What is assumed of new objects: given, or learned from those that boxes told."""
+        return self._journal.size_prior or self._registry.size_prior
+
+    @property
+    def odometry_noise(self) -> OdometryNoise | None:
+        """Of a step, where that is estimated."""
+        return self._journal.odometry_noise if self._estimates_noise else None
 
     def estimate(self) -> Estimate:
         """Return all of it as ``solve`` does, objects by ascending ids."""
@@ -277,6 +313,7 @@ class OnlineSlam:
                 [_core.dual_quadric_from_ellipsoid(one) for one in ellipsoids]
             ).reshape(-1, 9),
             ellipsoids=ellipsoids,
+            dropped=dict(sorted(self.left_out.items())),
         )
 
     # ------------------------------------------------------------------------------ polish
@@ -288,23 +325,15 @@ class OnlineSlam:
         meanwhile moves along rigidly. ``result()`` of what is returned waits for it. Without steps
         or boxes there is nothing to do.
         """
-        self._take_polished(wait=True)
-        work = polish_session(self._session, self.solve_options, keeps_map=self._map_rows > 0)
-        started = self._pending = start_polish(work, background=background)
-        self._take_polished(wait=not background)
-        return started
+        self._polisher.take(wait=True)
+        return self._polisher.start(self._new_polish(), background=background)
 
-    def _take_polished(self, *, wait: bool = False) -> None:
-        """Merge what a polish has found, if it is done."""
-        pending = self._pending
-        if pending is None or not (wait or pending.done()):
-            return
-        self._pending = None
-        found = pending.result()
-        if len(found.poses):
-            ellipsoids = self._session.ellipsoids[: found.objects]
-            ellipsoids[found.rows] = found.ellipsoids
-            self._session.merge(found.poses, ellipsoids)
+    def _new_polish(self) -> Polish:
+        if self._map_rows:
+            return Smoothing(self._session)
+        if self._identifier.has_begun:
+            return self._identifier.polish(self._session, self._registry, self.solve_options)
+        return Solve(self._session, self.solve_options)
 
     # ------------------------------------------------------------------------------ maps
 
@@ -317,13 +346,15 @@ class OnlineSlam:
             With too few boxes of the map, when no pose explains them, or when two do.
         """
         checked = check_boxes(boxes)
+        covariances = self._covariances()
+        rows = enumerate(self._rows())
         return relocalise(
             self.camera,
             self.pose_model,
             self.objects,
-            self._covariances(),
+            {place: covariances[row] for place, row in rows if row in covariances},
             checked,
-            self._box_noise_rows(checked.box),
+            box_noise_rows(self._box_noise, checked.box),
         )
 
     def _covariances(self) -> Mapping[int, Floats]:
@@ -338,7 +369,10 @@ class OnlineSlam:
         """Write the estimate and its covariances, as ``save_estimate`` does."""
         from dqslam.online.maps import save_session
 
-        save_session(self, self._session, self._registry.ids, self._covariances(), directory)
+        rows = self._rows()
+        covariances = self._covariances()
+        by_id = {self._registry.ids[row]: covariances[row] for row in rows if row in covariances}
+        save_session(self, by_id, directory)
 
     @classmethod
     def load(
@@ -355,6 +389,8 @@ class OnlineSlam:
         online: _core.OnlineOptions | None = None,
         size_prior: SizePrior | SizePriors | None = None,
         scene_priors: _core.ScenePriors | None = None,
+        trust_ids: float = FINAL,
+        finds_movers: bool = False,
     ) -> OnlineSlam:
         """Continue a map that was saved: its objects, with their covariances, are what is known.
 
@@ -388,6 +424,8 @@ class OnlineSlam:
             box_noise=box_noise,
             size_prior=size_prior,
             scene_priors=scene_priors,
+            trust_ids=trust_ids,
+            finds_movers=finds_movers,
         )
         slam._add_map(known)
         if first_boxes is not None:
@@ -404,6 +442,7 @@ class OnlineSlam:
             self._registry.register([(number, prior)])
             self._registry.votes[-1][name] += 1
             self._map_covariance[len(self._registry.ids) - 1] = covariance
+            self._journal.know_map_object(len(self._registry.ids) - 1, name, covariance)
         self._map_rows = len(self._registry.ids)
 
 
