@@ -120,8 +120,8 @@ def run(
     believed = parse_noise("--odometry-noise", odometry_noise) or added
     if odometry_covariance is not None and believed is not None:
         raise ValueError("--odometry-covariance: the noise is given already, by another option")
-    if online and (mode == "mapping" or hold_out):
-        raise ValueError("--online: goes neither with --mode mapping nor with --hold-out")
+    if online and mode == "mapping":
+        raise ValueError("--online: does not go with --mode mapping")
     final = trust_ids == 1.0 and ids != "none"
     trust = 1.0 if final else min(trust_ids, UNSURE)
     estimates_noise = believed is None and odometry_covariance is None
@@ -161,6 +161,8 @@ def run(
                 reference=reference,
                 size_prior=sizes,
                 estimates_noise=estimates_noise,
+                hold_out=hold_out,
+                seed=seed,
                 show=lambda slam, frame: progress(describe_step(slam, frame)),
             )
         else:

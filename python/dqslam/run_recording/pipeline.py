@@ -3,48 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dqslam import _core
-from dqslam.associate import CHI2_GATE, Association, associate, fill_in
+from dqslam.associate import FINAL, Association, associate, fill_in
 from dqslam.estimate import Estimate
 from dqslam.evaluate_results import common_poses
 from dqslam.io import OdometryNoise, Trajectory
 from dqslam.problem import BoxNoise, solve
-from dqslam.recording import Detections, Recording
+from dqslam.recording import Recording
 from dqslam.run_recording.border import with_cut_edges
-from dqslam.run_recording.hold_out import choose_held_out, describe_overlap, overlap_with_map
-from dqslam.run_recording.report import (
-    box_chi2,
-    describe_boxes,
-    describe_objects,
-    describe_size_prior,
-    describe_solver,
-    trajectory_error,
-)
+from dqslam.run_recording.conclude import Outcome, RunResult, conclude
+from dqslam.run_recording.hold_out import choose_held_out
 from dqslam.size_prior import SizePrior, SizePriors
 from dqslam.uncertainty import Marginals, marginal_covariances
-
-
-@dataclass(frozen=True)
-class RunResult:
-    """An estimate, what it was made from, and its report, ready for JSON."""
-
-    estimate: Estimate
-    detections: Detections
-    """All boxes, with the ids of the objects that they show; -1 for none."""
-    held_out: NDArray[np.bool_]
-    """Which boxes were kept from the estimator, shape (m,)."""
-    marginals: Marginals | None
-    """Covariances of the poses, NaN between keyframes, and of the mapped objects; None without
-    objects."""
-    summary: _core.Summary | None
-    """How the solver got there; None without objects."""
-    report: dict[str, Any]
 
 
 def perturb_odometry(
@@ -70,7 +45,7 @@ def perturb_odometry(
 def run(
     recording: Recording,
     *,
-    trust_ids: float = 1.0,
+    trust_ids: float = FINAL,
     mode: _core.Mode = _core.Mode.SLAM,
     reference: Trajectory | None = None,
     box_noise: BoxNoise | None = None,
@@ -121,31 +96,28 @@ def run(
         estimates_noise=estimates_noise,
         progress=progress,
     )
-    object_id = np.full(len(detections), -1)
+    object_id = np.where(held_out, detections.object_id, -1)
     object_id[~held_out] = found.object_id
-    shown = replace(detections, object_id=object_id)
     estimate, marginals, summary = _finish(known, found, mode)
-    assigned = shown.select(object_id >= 0)
-    chi2 = box_chi2(estimate, assigned, noise)
-    estimate = replace(estimate, inliers=chi2 <= CHI2_GATE[4])
-    tested = detections.select(held_out if hold_out else ~held_out)
-    if trust_ids < 1.0:
-        tested = replace(tested, object_id=np.full(len(tested), -1))
-    overlap, tested_id = overlap_with_map(estimate, tested)
-    if hold_out:
-        object_id[held_out] = tested_id
-        shown = replace(detections, object_id=object_id)
-    report = {
-        "mode": mode.name.lower(),
-        **_describe(found, estimate, assigned, chi2),
-        "reprojection": describe_overlap(overlap) | {"held_out": hold_out > 0.0},
-        "box_noise": {"pixels": noise.pixels, "relative": noise.relative},
-        "odometry_noise": _describe_noise(found, estimates_noise),
-        "under_constrained": [] if marginals is None else list(marginals.under_constrained),
-        "trajectory_error": None if reference is None else trajectory_error(estimate, reference),
-        "solver": None if summary is None else describe_solver(summary),
-    }
-    return RunResult(estimate, shown, held_out, marginals, summary, report)
+    outcome = Outcome(
+        estimate,
+        marginals,
+        summary,
+        mode=mode,
+        keyframes=len(found.keyframes),
+        box_noise=noise,
+        size_prior=found.scene.size_prior,
+        odometry_noise=(
+            found.scene.odometry_noise if estimates_noise and mode != _core.Mode.MAPPING else None
+        ),
+    )
+    return conclude(
+        outcome,
+        replace(detections, object_id=object_id),
+        held_out,
+        ids_are_final=trust_ids == FINAL,
+        reference=reference,
+    )
 
 
 def _finish(
@@ -215,33 +187,3 @@ def _nothing(recording: Recording, path: NDArray[np.float64], dropped: dict[int,
         ellipsoids=np.zeros((0, 9)),
         dropped=dict(sorted(dropped.items())),
     )
-
-
-def _describe(
-    found: Association, estimate: Estimate, assigned: Detections, chi2: NDArray[np.float64]
-) -> dict[str, Any]:
-    """Describe the map, and how the boxes that were given to objects fit it: chi-squares (m,)."""
-    mapped = np.isin(assigned.object_id, estimate.object_ids)
-    return {
-        "poses": len(estimate.timestamps),
-        "keyframes": len(found.keyframes),
-        "boxes": describe_boxes(chi2[mapped])
-        | {
-            "of_dropped_objects": int(np.sum(~mapped)),
-            "unassigned": int(np.sum(found.object_id < 0)),
-        },
-        "objects": describe_objects(estimate, assigned, chi2),
-        "dropped_objects": {str(name): why for name, why in estimate.dropped.items()},
-        "size_prior": describe_size_prior(found.scene.size_prior),
-    }
-
-
-def _describe_noise(found: Association, is_estimated: bool) -> dict[str, Any]:
-    if not is_estimated or found.scene.mode == _core.Mode.MAPPING:
-        return {"from": "given"}
-    noise = found.scene.odometry_noise
-    return {
-        "from": "estimated",
-        "translation_m": noise.translation_m,
-        "rotation_rad": noise.rotation_rad,
-    }
