@@ -36,6 +36,8 @@ void BindOptions(py::module_& m) {
       .def_readwrite("smoothing_iterations",
                      &OnlineOptions::smoothing_iterations,
                      "Levenberg-Marquardt steps of these two.")
+      .def_readwrite("tour_poses", &OnlineOptions::tour_poses, "Minimised by one such step,")
+      .def_readwrite("tour_every", &OnlineOptions::tour_every, "each so many steps.")
       .def_readwrite("loop_absence",
                      &OnlineOptions::loop_absence,
                      "Poses without a sight before an object closes a loop.")

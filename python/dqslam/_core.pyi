@@ -744,6 +744,20 @@ class OnlineOptions:
     @smoothing_iterations.setter
     def smoothing_iterations(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
     @property
+    def tour_every(self) -> int:
+        """
+        each so many steps.
+        """
+    @tour_every.setter
+    def tour_every(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    @property
+    def tour_poses(self) -> int:
+        """
+        Minimised by one such step,
+        """
+    @tour_poses.setter
+    def tour_poses(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    @property
     def window_iterations(self) -> int:
         """
         Levenberg-Marquardt steps of the window.

@@ -175,8 +175,9 @@ void Linearize(const Model& model,
   }
   const Eigen::Matrix4d& W = sight.sqrt_information;
   linear->residual = W * error;
+  linear->chi_square = linear->residual.squaredNorm();
   double loss;
-  Weigh(sight.is_box ? model.loss_scale : 0, linear->residual.squaredNorm(), &linear->cost, &loss);
+  Weigh(sight.is_box ? model.loss_scale : 0, linear->chi_square, &linear->cost, &loss);
   linear->residual *= loss;
   const Eigen::Matrix4d weight = loss * W;
   linear->by_pose = weight * linear->by_pose.eval();

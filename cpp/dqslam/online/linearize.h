@@ -26,8 +26,9 @@ struct Linear {
   Eigen::Vector4d residual;
   Eigen::Matrix<double, 4, Pose::kTangentSize> by_pose;
   Eigen::Matrix<double, 4, 9> by_object;
-  double cost;   ///< after the loss, which scales the rest
-  double depth;  ///< of the tangent residual [m], 0 where it is the box's
+  double chi_square;  ///< before the loss
+  double cost;        ///< after the loss, which scales the rest
+  double depth;       ///< of the tangent residual [m], 0 where it is the box's
 };
 
 /// Cost of a sight after the loss, and its chi-square before; with the residual that Linearize()

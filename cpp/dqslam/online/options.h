@@ -11,6 +11,8 @@ struct OnlineOptions {
   int lap_poses = 640;             ///< minimised rarely,
   int lap_every = 128;             ///< each so many steps, sooner while a session is young
   int smoothing_iterations = 5;    ///< Levenberg-Marquardt steps of these two
+  int tour_poses = 2048;           ///< minimised by one such step,
+  int tour_every = 512;            ///< each so many steps
   int loop_absence = 128;          ///< poses without a sight before an object closes a loop
   double loop_chi_square = 2.0;    ///< of the window, per residual: the loop does not fit
   int loop_iterations = 10;        ///< Levenberg-Marquardt steps over a loop

@@ -12,6 +12,10 @@ constexpr double kTolerance = 1e-2;
 // Mean chi-square of an object's sights, 4 where all is well, from which on it is in a wrong place.
 constexpr double kMisfit = 4 * 4;
 constexpr int kFewestSights = 3;
+// The watchdog technique: so many steps may cost more, one after the other, before the minimisation
+// comes back to where it was.  When a loop closes its valley is bent, and the step that is best of
+// all leads up its wall: the next ones lead down again, far ahead of where small steps creep.
+constexpr int kPatience = 3;
 
 // The pose of no motion: where the prior of a first pose starts from.
 template <typename Pose>
@@ -26,33 +30,6 @@ typename History<Pose>::Storage Identity() {
 }  // namespace
 
 template <typename Pose>
-int CountPast(const History<Pose>& history, const Object& object, int pose, int known) {
-  const int before = history.SightsBefore(pose);
-  const int count = static_cast<int>(object.sights.size());
-  while (known < count && object.sights[known] < before) ++known;
-  return known;
-}
-
-template <typename Pose>
-void AddPast(const Model& model,
-             const History<Pose>& history,
-             const Object& object,
-             int first,
-             int last,
-             Quadratic* past) {
-  Linear<Pose> linear;
-  const Vector9d d = object.chart - past->origin;
-  for (int i = first; i < last; ++i) {
-    const Sight& sight = history.sights[object.sights[i]];
-    const Station station = Station::At<Pose>(history.poses[sight.pose].data(), model.mount);
-    Linearize<Pose>(model, station, sight, object.chart, Edges::kBox, &linear);
-    const Matrix9d H = linear.by_object.transpose() * linear.by_object;
-    past->H += H;
-    past->g += linear.by_object.transpose() * linear.residual - H * d;
-  }
-}
-
-template <typename Pose>
 Work Region<Pose>::Minimize(
     History<Pose>* history, int begin, Past past, int iterations, double* damping, Edges edges) {
   Work work;
@@ -62,27 +39,38 @@ Work Region<Pose>::Minimize(
   end_ = history->num_poses();
   if (begin_ >= end_) return work;
   Collect(history, begin_, past, &work);
+  int uphill = 0;  // steps since the checkpoint
+  bool may_climb = true;
   for (int iteration = 0; iteration < iterations; ++iteration) {
-    bool solved = false;
-    const double before = LinearizeAll(*history, *damping, &solved, &work);
-    work.cost = before;
-    const bool possible = solved && MakeTrial(*history);
-    const double after = possible ? TrialCost(*history, &work) : before;
-    if (!(after < before)) {
-      *damping = std::min(std::max(*damping, 1e-6) * 10, kMostDamping);
+    const bool possible = LinearizeAll(*history, *damping, &work) && MakeTrial(*history);
+    if (possible) FitTrial(*history);
+    const double before = uphill > 0 ? saved_.fit.cost : here_.cost;
+    if (possible && there_.cost < before) {
+      TakeTrial(history);
+      *damping = std::max(*damping / 5, kLeastDamping);
+      uphill = 0;
+      may_climb = true;
+      if (before - here_.cost < kTolerance) break;
       continue;
     }
-    std::copy(trial_.begin(), trial_.end(), history->poses.begin() + begin_);
-    for (const Local& local : locals_) history->objects[local.object].chart = local.trial;
-    *damping = std::max(*damping / 5, kLeastDamping);
-    work.cost = after;
-    work.moved = true;
-    if (before - after < kTolerance) break;
+    may_climb = may_climb && possible && std::isfinite(there_.cost) && uphill < kPatience;
+    if (may_climb && iteration + 1 < iterations) {
+      if (uphill++ == 0) Save(*history);
+      TakeTrial(history);
+      continue;
+    }
+    if (uphill > 0) Restore(history);
+    uphill = 0;
+    *damping = std::min(std::max(*damping, 1e-6) * 10, kMostDamping);
   }
+  work.cost = here_.cost;
+  work.chi_square = here_.chi_square;
   work.front = chain_.most_objects();
-  for (const Local& local : locals_) {
+  for (size_t i = 0; i < locals_.size(); ++i) {
+    const Local& local = locals_[i];
     local_of_object_[local.object] = -1;
-    const bool misfit = local.sights >= kFewestSights && local.chi_square > kMisfit * local.sights;
+    const bool misfit =
+        local.sights >= kFewestSights && here_.of_object[i] > kMisfit * local.sights;
     if (misfit) work.misfits.push_back(local.object);
   }
   return work;
@@ -100,10 +88,13 @@ void Region<Pose>::Collect(History<Pose>* history, int begin, Past past, Work* w
     int& local = local_of_object_[sight.object];
     if (local < 0) {
       local = static_cast<int>(locals_.size());
-      locals_.push_back({sight.object, sight.pose, -1, nullptr, Vector9d::Zero(), 0, 0});
+      locals_.push_back({sight.object, sight.pose, -1, nullptr, 0, Vector9d::Zero()});
     }
     locals_[local].last_pose = sight.pose;
+    ++locals_[local].sights;
+    work->residuals += sight.is_box ? 4 : 3;
   }
+  work->residuals += k * (end_ - begin_);
   depth_.assign(last - first, 0);
   anew_.clear();
   anew_.reserve(locals_.size());  // no growth: pointers into it
@@ -123,40 +114,37 @@ void Region<Pose>::Collect(History<Pose>* history, int begin, Past past, Work* w
 }
 
 template <typename Pose>
-double Region<Pose>::LinearizeAll(const History<Pose>& history,
-                                  double damping,
-                                  bool* solved,
-                                  Work* work) {
+bool Region<Pose>::LinearizeAll(const History<Pose>& history, double damping, Work* work) {
   chain_.Reset(damping);
   for (Local& local : locals_) local.slot = -1;
   work->undefined = 0;
-  double cost = 0;
-  *solved = true;
-  for (int pose = begin_; pose < end_ && *solved; ++pose) {
+  here_.cost = here_.chi_square = 0;
+  here_.of_object.assign(locals_.size(), 0);
+  bool solved = true;
+  for (int pose = begin_; pose < end_ && solved; ++pose) {
     const double* from = pose > 0 ? history.poses[pose - 1].data() : identity_.data();
     const LinearStep<Pose> step =
         LinearizeStep<Pose>(history.steps[pose], from, history.poses[pose].data());
-    cost += 0.5 * step.residual.squaredNorm();
+    here_.chi_square += step.residual.squaredNorm();
     if (pose == begin_) {  // from a constant pose
       chain_.AddPose(step.by_to.transpose() * step.by_to, step.by_to.transpose() * step.residual);
     } else {
-      *solved = chain_.NextPose(step.residual, step.by_from, step.by_to) && Leave(pose - 1);
+      solved = chain_.NextPose(step.residual, step.by_from, step.by_to) && Leave(pose - 1);
     }
-    if (*solved) cost += LinearizePose(history, pose, work);
+    if (solved) LinearizePose(history, pose, work);
   }
-  *solved = *solved && chain_.Finish() && std::isfinite(cost);
-  return cost;
+  here_.cost += 0.5 * here_.chi_square;
+  return solved && chain_.Finish() && std::isfinite(here_.cost);
 }
 
 template <typename Pose>
-double Region<Pose>::LinearizePose(const History<Pose>& history, int pose, Work* work) {
-  double cost = 0;
+void Region<Pose>::LinearizePose(const History<Pose>& history, int pose, Work* work) {
   const double* at = history.poses[pose].data();
   if (model_.scene.camera_height_sigma > 0) {
     Eigen::Matrix<double, k, 1> jacobian;
     const double residual = LinearizeHeight<Pose>(model_, at, &jacobian);
     chain_.AddPose(jacobian * jacobian.transpose(), jacobian * residual);
-    cost += 0.5 * residual * residual;
+    here_.cost += 0.5 * residual * residual;
   }
   const Station station = Station::At<Pose>(at, model_.mount);
   const int first = history.SightsBefore(begin_);
@@ -171,17 +159,18 @@ double Region<Pose>::LinearizePose(const History<Pose>& history, int pose, Work*
       Quadratic sum;
       sum.H = local.past->H;
       sum.g = GradientOf(*local.past, object.chart);
-      cost += CostOf(*local.past, object.chart) + AddPriors(model_, object, object.chart, &sum);
+      here_.cost +=
+          CostOf(*local.past, object.chart) + AddPriors(model_, object, object.chart, &sum);
       chain_.AddObjectInformation(local.slot, sum.H, sum.g);
     }
     ++work->linearized;
     Linearize<Pose>(model_, station, sight, object.chart, edges_, &linear);
     depth_[row - first] = linear.depth;
     work->undefined += linear.depth > 0;
-    cost += linear.cost;
+    here_.chi_square += 2 * linear.cost;
+    here_.of_object[local_of_object_[sight.object]] += linear.chi_square;
     chain_.AddSight(local.slot, linear.residual, linear.by_pose, linear.by_object);
   }
-  return cost;
 }
 
 // Eliminates the objects that a pose saw last.
@@ -225,49 +214,66 @@ const double* Region<Pose>::TrialPose(const History<Pose>& history, int pose) co
 }
 
 template <typename Pose>
-double Region<Pose>::TrialCost(const History<Pose>& history, Work* work) {
-  double cost = 0;
-  for (Local& local : locals_) {
-    local.chi_square = local.sights = 0;
+void Region<Pose>::FitTrial(const History<Pose>& history) {
+  there_.cost = there_.chi_square = 0;
+  there_.of_object.assign(locals_.size(), 0);
+  for (const Local& local : locals_) {
     const Object& object = history.objects[local.object];
-    cost += CostOf(*local.past, local.trial) + CostOfPriors(model_, object, local.trial);
+    there_.cost += CostOf(*local.past, local.trial) + CostOfPriors(model_, object, local.trial);
   }
   const int first = history.SightsBefore(begin_);
-  double measured = 0;
-  int residuals = 0;
   for (int pose = begin_; pose < end_; ++pose) {
     const double* at = TrialPose(history, pose);
-    measured += CostOfStep<Pose>(history.steps[pose], TrialPose(history, pose - 1), at);
-    residuals += k;
+    there_.chi_square +=
+        2 * CostOfStep<Pose>(history.steps[pose], TrialPose(history, pose - 1), at);
     if (model_.scene.camera_height_sigma > 0) {
       Eigen::Matrix<double, k, 1> unused;
-      cost += 0.5 * std::pow(LinearizeHeight<Pose>(model_, at, &unused), 2);
+      there_.cost += 0.5 * std::pow(LinearizeHeight<Pose>(model_, at, &unused), 2);
     }
     const Station station = Station::At<Pose>(at, model_.mount);
     for (int row = history.SightsBefore(pose); row < history.SightsBefore(pose + 1); ++row) {
       const Sight& sight = history.sights[row];
       if (sight.Waits()) continue;
-      Local& local = locals_[local_of_object_[sight.object]];
+      const int local = local_of_object_[sight.object];
       double chi_square;
-      measured +=
-          CostOfSight(model_, station, sight, local.trial, depth_[row - first], &chi_square);
-      if (!std::isfinite(chi_square)) return chi_square;
-      local.chi_square += chi_square;
-      ++local.sights;
-      residuals += sight.is_box ? 4 : 3;
+      there_.chi_square +=
+          2 * CostOfSight(
+                  model_, station, sight, locals_[local].trial, depth_[row - first], &chi_square);
+      there_.of_object[local] += chi_square;
+      if (!std::isfinite(chi_square)) {
+        there_.cost = chi_square;
+        return;
+      }
     }
   }
-  work->chi_square = 2 * measured;
-  work->residuals = residuals;
-  return cost + measured;
+  there_.cost += 0.5 * there_.chi_square;
 }
 
-#define DQSLAM_INSTANTIATE(Pose)                                               \
-  template class Region<Pose>;                                                 \
-  template int CountPast<Pose>(const History<Pose>&, const Object&, int, int); \
-  template void AddPast<Pose>(                                                 \
-      const Model&, const History<Pose>&, const Object&, int, int, Quadratic*)
-DQSLAM_INSTANTIATE(Se2);
-DQSLAM_INSTANTIATE(Se3);
+template <typename Pose>
+void Region<Pose>::TakeTrial(History<Pose>* history) {
+  std::copy(trial_.begin(), trial_.end(), history->poses.begin() + begin_);
+  for (const Local& local : locals_) history->objects[local.object].chart = local.trial;
+  std::swap(here_, there_);
+}
+
+template <typename Pose>
+void Region<Pose>::Save(const History<Pose>& history) {
+  saved_.fit = here_;
+  saved_.poses.assign(history.poses.begin() + begin_, history.poses.end());
+  saved_.charts.clear();
+  for (const Local& local : locals_) saved_.charts.push_back(history.objects[local.object].chart);
+}
+
+template <typename Pose>
+void Region<Pose>::Restore(History<Pose>* history) {
+  here_ = saved_.fit;
+  std::copy(saved_.poses.begin(), saved_.poses.end(), history->poses.begin() + begin_);
+  for (size_t i = 0; i < locals_.size(); ++i) {
+    history->objects[locals_[i].object].chart = saved_.charts[i];
+  }
+}
+
+template class Region<Se2>;
+template class Region<Se3>;
 
 }  // namespace dqslam::online

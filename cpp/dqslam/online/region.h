@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "dqslam/online/chain.h"
-#include "dqslam/online/linearize.h"
+#include "dqslam/online/past.h"
 
 namespace dqslam::online {
 
@@ -18,23 +18,8 @@ struct Work {
   double chi_square = 0;     ///< of steps and sights of the region, at the end
   int residuals = 0;         ///< how many numbers that is the sum of
   double cost = 0;           ///< at the end, priors and older sights included
-  bool moved = false;        ///< whether an iteration was accepted
   std::vector<int> misfits;  ///< objects that their sights in the region do not fit
 };
-
-/// Information about an object from its sights before a pose, poses held fixed: rows
-/// [first, last) of object.sights, linearised where all stand now.
-template <typename Pose>
-void AddPast(const Model& model,
-             const History<Pose>& history,
-             const Object& object,
-             int first,
-             int last,
-             Quadratic* past);
-
-/// How many sights of an object are from poses before `pose`; it has `known` at least.
-template <typename Pose>
-int CountPast(const History<Pose>& history, const Object& object, int pose, int known);
 
 template <typename Pose>
 class Region {
@@ -61,17 +46,33 @@ class Region {
     int last_pose;  ///< that sees it
     int slot;
     const Quadratic* past;
+    int sights;  ///< in the region
     Vector9d trial;
-    double chi_square = 0;  ///< of its sights in the region, at the trial
-    int sights = 0;
+  };
+
+  /// How well a state fits.
+  struct Fit {
+    double cost = 0;                ///< priors and older sights included
+    double chi_square = 0;          ///< of the region's steps and sights
+    std::vector<double> of_object;  ///< chi-square of the sights of each local object
+  };
+
+  /// Where a minimisation comes back to if it finds nothing better.
+  struct Checkpoint {
+    Fit fit;
+    std::vector<Storage> poses;
+    std::vector<Vector9d> charts;
   };
 
   void Collect(History<Pose>* history, int begin, Past past, Work* work);
-  double LinearizeAll(const History<Pose>& history, double damping, bool* solved, Work* work);
-  double LinearizePose(const History<Pose>& history, int pose, Work* work);
+  bool LinearizeAll(const History<Pose>& history, double damping, Work* work);
+  void LinearizePose(const History<Pose>& history, int pose, Work* work);
   bool Leave(int pose);
   bool MakeTrial(const History<Pose>& history);
-  double TrialCost(const History<Pose>& history, Work* work);
+  void FitTrial(const History<Pose>& history);
+  void TakeTrial(History<Pose>* history);
+  void Save(const History<Pose>& history);
+  void Restore(History<Pose>* history);
   const double* TrialPose(const History<Pose>& history, int pose) const;
 
   const Model& model_;
@@ -82,6 +83,8 @@ class Region {
   std::vector<Quadratic> anew_;
   std::vector<int> local_of_object_;  ///< -1 outside of Minimize
   std::vector<Storage> trial_;
+  Fit here_, there_;  ///< of the history, and of the trial
+  Checkpoint saved_;
   std::vector<double> depth_;  ///< of the tangent residuals of the region's sights, 0 for boxes
   Storage identity_ = Storage::Zero();
 };

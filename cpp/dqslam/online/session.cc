@@ -6,8 +6,10 @@
 
 #include "dqslam/dispatch.h"
 #include "dqslam/online/checks.h"
+#include "dqslam/online/merge.h"
 #include "dqslam/online/recover.h"
 #include "dqslam/online/region.h"
+#include "dqslam/online/schedule.h"
 #include "dqslam/online/start.h"
 #include "dqslam/online/to_graph.h"
 #include "dqslam/whitening.h"
@@ -15,16 +17,31 @@
 namespace dqslam::online {
 namespace {
 
-constexpr double kFirstDamping = 1e-4;
+// What a long chain of poses does as a whole weighs little beside the diagonal of its normal
+// equations: with more damping than this it only creeps.
+constexpr double kFirstDamping = 1e-8;
 constexpr double kMostDamping = 1e-2;  // that a window takes over from the one before
-constexpr double kLapObjects = 40;     // in the front of a lap of full length, at most
-// A young session minimises a lap whenever it has grown by this share, after so many steps.
-constexpr int kLapGrowth = 4, kSoonestLap = 16;
 // An object is started again when it has so many sights.
 constexpr int kTryAgainAt[] = {4, 8, 16, 32};
-// What lies before the window is linearised anew when it has grown by this share.
-constexpr double kGrowth = 1.25;
 constexpr int kSettleIterations = 6;
+
+// The object of a map, with the prior on its size that all objects have: the covariance has it too.
+Object ObjectOfMap(const Model& model,
+                   const Vector9d& ellipsoid,
+                   const Matrix9d& covariance,
+                   const SizePrior& size) {
+  Object object;
+  object.chart = ChartFromEllipsoid(ellipsoid);
+  object.size = size;
+  object.map.origin = object.chart;
+  const Matrix9d W = SqrtInformation<9>(covariance);
+  object.map.H = InformationInChart(object.chart, W.transpose() * W);
+  Quadratic size_prior;
+  AddPriors(model, object, object.chart, &size_prior);
+  object.map.g = -(size_prior.g - GradientOf(object.map, object.chart));
+  object.map.H -= size_prior.H - object.map.H;
+  return object;
+}
 
 template <typename Pose>
 class SessionOf : public Session {
@@ -34,7 +51,10 @@ class SessionOf : public Session {
   using Past = typename Region<Pose>::Past;
 
   SessionOf(const Camera& camera, const ScenePriors& scene, const OnlineOptions& options)
-      : options_(options), model_(camera, scene, options.loss_scale), region_(model_) {}
+      : options_(options),
+        model_(camera, scene, options.loss_scale),
+        region_(model_),
+        schedule_(options) {}
 
   StepReport Add(const Eigen::VectorXd& relative,
                  const RowMatrix& covariance,
@@ -66,31 +86,14 @@ class SessionOf : public Session {
   void AddMapObject(const Vector9d& ellipsoid,
                     const Matrix9d& covariance,
                     const SizePrior& size) override {
-    Object object;
-    object.chart = ChartFromEllipsoid(ellipsoid);
-    object.size = size;
-    object.map.origin = object.chart;
-    const Matrix9d W = SqrtInformation<9>(covariance);
-    object.map.H = InformationInChart(object.chart, W.transpose() * W);
-    // The prior on its size is in that covariance already.
-    Quadratic size_prior;
-    AddPriors(model_, object, object.chart, &size_prior);
-    object.map.g = -(size_prior.g - GradientOf(object.map, object.chart));
-    object.map.H -= size_prior.H - object.map.H;
-    history_.objects.push_back(object);
+    history_.objects.push_back(ObjectOfMap(model_, ellipsoid, covariance, size));
   }
 
   std::unique_ptr<Session> Clone() const override {
     auto copy = std::make_unique<SessionOf>(model_.camera, model_.scene, options_);
     copy->history_ = history_;
     copy->damping_ = damping_;
-    copy->next_lap_ = next_lap_;
-    copy->lap_objects_ = lap_objects_;
-    copy->next_recovery_ = next_recovery_;
-    copy->loop_begin_ = loop_begin_;
-    copy->loop_until_ = loop_until_;
-    copy->loop_misfits_ = loop_misfits_;
-    copy->loop_credit_ = loop_credit_;
+    copy->schedule_ = schedule_;
     return copy;
   }
 
@@ -101,7 +104,8 @@ class SessionOf : public Session {
       if (object.sights.empty()) continue;
       const int seen = history_.sights[object.sights.back()].pose;
       if (seen < num_poses() - options_.recent_poses) continue;
-      if (CloseLoop(changed.last, changed.back)) loop_misfits_ = loop_misfits_ || Misfits(object);
+      const bool is_watched = schedule_.WatchLoop(changed.last, changed.back, num_poses() - 1);
+      if (is_watched && Misfits(object)) schedule_.LoopDoesNotFit();
     }
   }
 
@@ -128,43 +132,12 @@ class SessionOf : public Session {
     }
     double damping = kFirstDamping;
     const Work work = region_.Minimize(&history_, begin, Past::kAnew, iterations, &damping);
-    MarkStale(begin);
+    MarkStale(begin, &history_);
     return work.cost;
   }
 
   void Merge(const RowMatrix& poses, const RowMatrix& ellipsoids) override {
-    const int merged = static_cast<int>(poses.rows()),
-              objects = static_cast<int>(ellipsoids.rows());
-    if (merged < 1 || merged > num_poses() || objects > num_objects() ||
-        poses.cols() != Pose::kSize || (objects > 0 && ellipsoids.cols() != kLandmarkSize) ||
-        !poses.allFinite() || !ellipsoids.allFinite()) {
-      throw std::invalid_argument("merge: expected finite poses and objects of this session");
-    }
-    const Storage old = history_.poses[merged - 1];
-    const Rigid<double> before = Pose::WorldFromRobot(old.data());
-    for (int row = 0; row < merged; ++row) history_.poses[row] = poses.row(row).transpose();
-    const Storage now = history_.poses[merged - 1];
-    const Rigid<double> after = Pose::WorldFromRobot(now.data());
-    for (int row = merged; row < num_poses(); ++row) {
-      Storage relative, moved;
-      Pose::Between(old.data(), history_.poses[row].data(), relative.data());
-      Pose::Compose(now.data(), relative.data(), moved.data());
-      Pose::Normalize(moved.data());
-      history_.poses[row] = moved;
-    }
-    const Eigen::Matrix3d turn = after.rotation * before.rotation.transpose();
-    for (int row = 0; row < num_objects(); ++row) {
-      Object& object = history_.objects[row];
-      object.is_stale = true;
-      if (row < objects) {
-        object.chart = ChartFromEllipsoid(ellipsoids.row(row).transpose());
-        continue;
-      }
-      Surface<double> surface = SurfaceOf(object.chart);
-      surface.center = turn * (surface.center - before.translation) + after.translation;
-      surface.shape = turn * surface.shape * turn.transpose();
-      object.chart = ChartFromSurface(surface);
-    }
+    online::Merge(poses, ellipsoids, &history_);
   }
 
   Graph ToGraph(std::vector<int>* rows) const override {
@@ -211,7 +184,7 @@ class SessionOf : public Session {
     if (sight.Waits()) return;
     Object& object = history_.objects[sight.object];
     if (!object.sights.empty()) {
-      CloseLoop(history_.sights[object.sights.back()].pose, sight.pose);
+      schedule_.WatchLoop(history_.sights[object.sights.back()].pose, sight.pose, sight.pose);
     }
     object.sights.push_back(static_cast<int>(history_.sights.size()) - 1);
     if (object.chart.isZero(0)) object.chart = Birth(model_, history_, object);
@@ -222,19 +195,6 @@ class SessionOf : public Session {
       TryAgain(model_, history_, &object);
       object.is_stale = true;
     }
-  }
-
-  // Whether an object that was back after an absence closes a loop: the window is watched for it.
-  bool CloseLoop(int last, int back) {
-    if (back - last <= options_.loop_absence) return false;
-    const int now = num_poses() - 1;
-    if (loop_until_ < now) {
-      loop_begin_ = last;
-      loop_misfits_ = false;
-    }
-    loop_begin_ = std::min(loop_begin_, last);
-    loop_until_ = now + options_.window_poses;
-    return true;
   }
 
   // Whether no place of an object fits all its sights.  Of one that was told late the window may
@@ -252,7 +212,7 @@ class SessionOf : public Session {
     report.first_sight = history_.steps.back().first_sight;
     const int begin = std::max(end - options_.window_poses, FirstFree());
     if (begin >= end) return report;
-    report.linearized = KeepPast(begin);
+    report.linearized = KeepPast(model_, begin, &history_);
     damping_ = std::min(damping_, kMostDamping);
     const Work window =
         region_.Minimize(&history_, begin, Past::kKept, options_.window_iterations, &damping_);
@@ -261,40 +221,32 @@ class SessionOf : public Session {
     report.linearized += window.linearized;
     report.undefined = window.undefined;
     report.chi_square = window.residuals > 0 ? window.chi_square / window.residuals : 0;
-    if (DoesNotFit(window)) StartYoungAgain(&report);
-    const int smooth_from = ChooseSmoothing(window, begin, &report);
-    if (smooth_from < begin) {
-      const int iterations =
-          report.closed_loop ? options_.loop_iterations : options_.smoothing_iterations;
-      SmoothFrom(smooth_from, iterations, &report);
-    }
+    const WindowFit fit{begin, end, report.chi_square, window.undefined};
+    if (schedule_.Recovers(fit)) StartYoungAgain(&report);
+    const Smoothing smoothing = schedule_.Choose(fit);
+    report.closed_loop = smoothing.closes_loop;
+    if (smoothing.begin < begin) SmoothRegion(smoothing, &report);
     return report;
   }
 
   int FirstFree() const { return history_.first_pose_is_known ? 1 : 0; }
 
-  bool DoesNotFit(const Work& window) {
-    return num_poses() >= next_recovery_ &&
-           (window.undefined > 0 ||
-            window.chi_square > options_.misfit_chi_square * window.residuals);
-  }
-
   void StartYoungAgain(StepReport* report) {
-    next_recovery_ = num_poses() + options_.recover_every;
     const int begin = std::max(num_poses() - options_.recent_poses, FirstFree());
     report->smoothed_sights += Recover(model_, begin, options_, &region_, &history_);
     report->smoothed_poses = num_poses() - begin;
     report->recovered = true;
-    MarkStale(begin);
+    MarkStale(begin, &history_);
   }
 
   // Objects in a wrong place are started again, and all is minimised once more.
-  void SmoothFrom(int begin, int iterations, StepReport* report) {
+  void SmoothRegion(const Smoothing& smoothing, StepReport* report) {
     double damping = kFirstDamping;
-    for (int round = 0; round < 2; ++round) {
-      const Work work = region_.Minimize(&history_, begin, Past::kAnew, iterations, &damping);
-      MarkStale(begin);
-      if (work.poses > options_.recent_poses) lap_objects_ = work.front;
+    for (int round = 0; round < smoothing.rounds; ++round) {
+      const Work work =
+          region_.Minimize(&history_, smoothing.begin, Past::kAnew, smoothing.iterations, &damping);
+      MarkStale(smoothing.begin, &history_);
+      schedule_.SmoothedWith(work.poses, work.front);
       report->smoothed_poses = work.poses;
       report->smoothed_sights += work.linearized;
       bool changed = false;
@@ -309,80 +261,12 @@ class SessionOf : public Session {
     }
   }
 
-  // Work is square in the objects: where there are many, a lap is shorter.
-  int LapPoses() const {
-    const double square = lap_objects_ * lap_objects_ / (kLapObjects * kLapObjects);
-    const int poses = static_cast<int>(options_.lap_poses / std::max(square, 1.0));
-    return std::max(poses, std::min(options_.recent_poses, options_.lap_poses));
-  }
-
-  // The first pose to minimise beside the window's; the window's begin for none.
-  int ChooseSmoothing(const Work& window, int begin, StepReport* report) {
-    const int end = num_poses();
-    loop_credit_ = std::min(loop_credit_ + 1.0 / options_.lap_every, 3.0);
-    const bool loop_is_near = loop_until_ >= end - 1;
-    if (loop_is_near && loop_credit_ >= 1 &&
-        (loop_misfits_ || window.chi_square > options_.loop_chi_square * window.residuals)) {
-      loop_credit_ -= 1;
-      loop_until_ = -1;
-      loop_misfits_ = false;
-      report->closed_loop = true;
-      return std::min(loop_begin_, begin);
-    }
-    if (end >= next_lap_) {
-      next_lap_ = end + std::clamp(end / kLapGrowth, kSoonestLap, options_.lap_every);
-      return std::max(end - LapPoses(), 0);
-    }
-    if (end % options_.recent_every == 0) return std::max(end - options_.recent_poses, 0);
-    return begin;
-  }
-
-  // What the objects of the window keep of the sights before it; counts sights linearised.
-  int KeepPast(int begin) {
-    int linearized = 0;
-    const int first = history_.SightsBefore(begin);
-    for (int row = first; row < static_cast<int>(history_.sights.size()); ++row) {
-      if (history_.sights[row].Waits()) continue;
-      Object& object = history_.objects[history_.sights[row].object];
-      const int known = object.is_stale ? 0 : object.past_sights;
-      const int count = CountPast(history_, object, begin, known);
-      if (!object.is_stale && count == object.past_sights) continue;
-      int from = object.past_sights;
-      if (object.is_stale || count > kGrowth * object.linearized) {
-        object.past = Quadratic();
-        object.past.origin = object.chart;
-        object.linearized = count;
-        object.is_stale = false;
-        from = 0;
-      }
-      AddPast(model_, history_, object, from, count, &object.past);
-      object.past_sights = count;
-      linearized += count - from;
-    }
-    return linearized;
-  }
-
-  // The objects that poses from `begin` on saw have moved, and so have these poses.
-  void MarkStale(int begin) {
-    for (int row = history_.SightsBefore(begin); row < static_cast<int>(history_.sights.size());
-         ++row) {
-      const Sight& sight = history_.sights[row];
-      if (!sight.Waits()) history_.objects[sight.object].is_stale = true;
-    }
-  }
-
   OnlineOptions options_;
   Model model_;
   Region<Pose> region_;
   History<Pose> history_;
+  Schedule schedule_;
   double damping_ = kFirstDamping;  // of the window
-  int loop_begin_ = 0;              // the pose that last saw what has come back
-  int loop_until_ = -1;             // until when the window is watched for it
-  bool loop_misfits_ = false;       // it was told late, and needs no watching
-  int next_lap_ = kSoonestLap;
-  int next_recovery_ = 0;
-  double lap_objects_ = 0;  // in the front of the last lap
-  double loop_credit_ = 1;  // loops that may be closed now
 };
 
 }  // namespace
@@ -395,8 +279,9 @@ std::unique_ptr<Session> Session::Make(PoseModel pose_model,
   const bool good = options.window_poses > 0 && options.window_iterations > 0 &&
                     options.recent_poses > 0 && options.recent_every > 0 && options.lap_poses > 0 &&
                     options.lap_every > 0 && options.smoothing_iterations > 0 &&
-                    options.loop_absence > 0 && options.loop_chi_square > 0 &&
-                    options.loop_iterations > 0 && options.loss_scale >= 0;
+                    options.tour_poses > 0 && options.tour_every > 0 && options.loop_absence > 0 &&
+                    options.loop_chi_square > 0 && options.loop_iterations > 0 &&
+                    options.loss_scale >= 0;
   if (!good) throw std::invalid_argument("online options: all must be positive");
   return Dispatch(pose_model, [&](auto pose) -> std::unique_ptr<Session> {
     return std::make_unique<SessionOf<decltype(pose)>>(camera, scene, options);

@@ -1,0 +1,52 @@
+"""What a session holds beside what a polish finds: means over several drives."""
+
+import numpy as np
+import pytest
+from benchmarks.problems import chain, paper
+
+from dqslam.online import OnlineSlam, steps_of
+from test_online_loops import CAMERA, NOISE, ring
+
+
+def circle(seed, noise):
+    """188 m, closed after 420 steps."""
+    truth, motions, boxes = ring(seed, noise)
+    return CAMERA, list(zip([None, *motions], boxes, strict=True)), truth
+
+
+def steps(problem):
+    given = [(step.odometry, step.boxes) for step in steps_of(problem.recording)]
+    return problem.recording.camera, given, problem.truth.poses
+
+
+def errors(camera, given, truth):
+    """RMSE before a polish and after it, metres."""
+
+    def rmse():
+        apart = (slam.trajectory - truth)[:, :2]
+        return np.sqrt(np.mean(np.sum(apart**2, axis=1)))
+
+    slam = OnlineSlam(camera, box_noise=NOISE)
+    for motion, boxes in given:
+        slam.add(motion, boxes)
+    before = rmse()
+    slam.polish()
+    return before, rmse()
+
+
+# With 0.02 m and 0.02 rad of noise a step, but for the first.
+DRIVES = {
+    "a third of the noise around a circle": [
+        lambda seed=seed: circle(seed, 0.3) for seed in range(4)
+    ],
+    "around a circle": [lambda seed=seed: circle(seed, 1.0) for seed in range(6)],
+    "the paper's": [lambda seed=seed: steps(paper(seed, 1.0)) for seed in range(6)],
+    "through three areas": [lambda seed=seed: steps(chain(3, 11, seed, 1.0)) for seed in range(3)],
+}
+
+
+@pytest.mark.parametrize("drives", DRIVES.values(), ids=DRIVES.keys())
+def test_a_session_is_nearly_as_good_as_its_polish(drives):
+    before, after = np.array([errors(*drive()) for drive in drives]).T
+    assert np.mean(before) <= 1.25 * np.mean(after)
+    assert np.median(before / after) <= 1.25
