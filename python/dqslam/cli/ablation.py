@@ -19,7 +19,9 @@ if TYPE_CHECKING:
 def ablation(
     context: typer.Context,
     out: ResultDirectory,
-    trials: Annotated[int, typer.Option(min=1, help="Drives to solve; each takes 20 seconds.")] = 10,
+    trials: Annotated[
+        int, typer.Option(min=1, help="Drives to solve; each takes 20 seconds.")
+    ] = 10,
     seed: FirstSeed = 0,
     jobs: Jobs = None,
     config: ConfigFile = None,
