@@ -7,8 +7,8 @@ import typer
 
 from dqslam.cli.options import FirstSeed, Jobs, ResultDirectory
 from dqslam.cli.output import Json, Output, Quiet
-from dqslam.cli.results import draw_figure, results_directory, uninterrupted
-from dqslam.cli.settings import CONFIG, ConfigFile, save_settings
+from dqslam.cli.results import results_directory, save_study
+from dqslam.cli.settings import ConfigFile
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -46,11 +46,7 @@ def ablation(
             progress=progress,
         )
     output.table(_results(table))
-    with uninterrupted():
-        table.save(out / "ablation.json")
-        save_settings(context, out / CONFIG)
-        output.file(out / "ablation.json")
-        draw_figure(output, out / "ablation.png", lambda path: plot_ablation(table, path))
+    save_study(context, output, table, out / "ablation.json", plot_ablation)
 
 
 def _results(table: "AblationTable") -> "Table":

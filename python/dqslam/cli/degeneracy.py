@@ -6,8 +6,8 @@ import typer
 
 from dqslam.cli.options import FirstSeed, ResultDirectory
 from dqslam.cli.output import Json, Output, Quiet
-from dqslam.cli.results import draw_figure, results_directory, uninterrupted
-from dqslam.cli.settings import CONFIG, ConfigFile, save_settings
+from dqslam.cli.results import results_directory, save_study
+from dqslam.cli.settings import ConfigFile
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -35,11 +35,7 @@ def degeneracy(
     with results_directory(out), output.trials(trials) as progress:
         table = run_degeneracy(trials=trials, seed=seed, progress=progress)
     output.table(_results(table))
-    with uninterrupted():
-        table.save(out / "degeneracy.json")
-        save_settings(context, out / CONFIG)
-        output.file(out / "degeneracy.json")
-        draw_figure(output, out / "degeneracy.png", lambda path: plot_degeneracy(table, path))
+    save_study(context, output, table, out / "degeneracy.json", plot_degeneracy)
 
 
 def _results(table: "DegeneracyTable") -> "Table":

@@ -8,10 +8,24 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol, TypeVar
+
+import typer
+
+from dqslam.cli.settings import CONFIG, save_settings
 
 if TYPE_CHECKING:
     from dqslam.cli.output import Output
+
+
+class Table(Protocol):
+    """What a study comes to."""
+
+    def save(self, path: Path) -> None:
+        """Write it as JSON."""
+
+
+SomeTable = TypeVar("SomeTable", bound=Table)
 
 
 @contextmanager
@@ -53,3 +67,18 @@ def draw_figure(output: Output, path: Path, draw: Callable[[Path], None]) -> Non
     with output.waiting("drawing"):
         draw(path)
     output.line(f"wrote {path}")
+
+
+def save_study(
+    context: typer.Context,
+    output: Output,
+    table: SomeTable,
+    path: Path,
+    draw: Callable[[SomeTable, Path], None],
+) -> None:
+    """Write the table of a study, the options that made it, and its figure beside it."""
+    with uninterrupted():
+        table.save(path)
+        save_settings(context, path.with_name(CONFIG))
+        output.file(path)
+        draw_figure(output, path.with_suffix(".png"), lambda image: draw(table, image))
