@@ -6,19 +6,9 @@ import pytest
 from dqslam.cli import main
 from dqslam.cli.run import parse_noise
 from dqslam.io import OdometryNoise, read_trajectory
-from orbit import NAMES, make_orbit, write_orbit
+from orbit import NAMES
 
 PERTURB = ("--perturb-odometry", "translation=0.01,rotation=0.01")
-
-
-@pytest.fixture(scope="module")
-def orbit():
-    return make_orbit(noise_px=1.0)
-
-
-@pytest.fixture
-def files(tmp_path, orbit):
-    return write_orbit(tmp_path, orbit)
 
 
 def call(files, *more):

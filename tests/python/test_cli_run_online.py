@@ -3,7 +3,7 @@
 import numpy as np
 
 from dqslam.io import load_results
-from test_cli_run import PERTURB, call, files, orbit, report  # noqa: F401, fixtures
+from test_cli_run import PERTURB, call, report
 
 
 def test_writes_what_a_run_writes(files, orbit, capsys):  # noqa: F811

@@ -1,7 +1,6 @@
 """Each mistake is planted in files that are right, where its check is silent."""
 
 import functools
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -10,10 +9,8 @@ from scipy.spatial.transform import Rotation
 
 import realdata
 from dqslam import Camera, _core
-from dqslam.cli import main
 from dqslam.inspect_recording import inspect_recording
-from dqslam.inspect_recording.rays import Views, inverted, residuals
-from dqslam.inspect_recording.tracks import overlap, overlap_ids
+from dqslam.inspect_recording.rays import inverted
 from dqslam.io import Trajectory, read_camera, read_detections, read_trajectory
 from orbit import make_orbit, write_orbit
 
@@ -261,150 +258,3 @@ def test_what_cannot_be_told_is_said(tmp_path):
     )
     with pytest.raises(ValueError, match="one pose only"):
         inspect(camera, Trajectory(still.timestamps[:1], still.world_from_camera[:1]), table, None)
-
-
-def test_rays_by_hand():
-    """Two metres ahead and 0.2 m aside of cameras that move sideways; one middle 500 px off."""
-    camera = Camera(400, 400, 320, 240, 640, 480)
-    x = np.array([-0.4, -0.2, 0.0, 0.2, 0.4])
-    poses = np.zeros((3, 5, 7))
-    poses[..., 0], poses[..., 6] = x, 1
-    middle = np.dstack([320 + 400 * (0.2 - x) / 2, np.full(5, 240.0)]).repeat(3, axis=0)
-    there = np.ones((3, 5), dtype=bool)
-    there[1, 4] = False  # a shorter track
-    poses[2], middle[2] = poses[0, 0], middle[0, 0]  # one that stands still
-    middle[0, 2, 1] += 500
-    off = residuals(camera, Views(poses, middle, there))
-    assert off[0, 2] == pytest.approx(500, abs=2)
-    assert np.delete(off[0], 2).max() < 2
-    np.testing.assert_allclose(off[1, :4], 0, atol=1e-9)
-    assert np.isnan(off[1, 4])
-    assert np.isnan(off[2]).all()
-    behind = residuals(camera, Views(inverted(poses), middle, there))
-    assert (behind[1, :4] == 1e4).all()
-
-
-def test_inverted_twice_is_the_same():
-    random = np.random.default_rng(0)
-    poses = np.hstack([random.normal(0, 1, (9, 3)), Rotation.random(9, random).as_quat()])
-    np.testing.assert_allclose(inverted(inverted(poses)), poses, atol=1e-14)
-    turn = Rotation.from_quat(poses[:, 3:])
-    np.testing.assert_allclose(turn.apply(inverted(poses)[:, :3]), -poses[:, :3], atol=1e-14)
-
-
-def test_overlap_by_hand():
-    boxes = np.array([[0.0, 0, 2, 2], [5, 5, 6, 6]])
-    np.testing.assert_allclose(overlap(boxes, np.array([[1.0, 0, 3, 2]])), [[1 / 3], [0]])
-
-
-def test_boxes_are_joined_by_overlap_within_their_class(tmp_path):
-    rows = [
-        "0,0,0,0,10,10,1,1,cup",
-        "0,0,100,0,110,10,1,1,cup",
-        "1,1,101,0,111,10,1,1,cup",
-        "1,1,1,0,11,10,1,2,jar",
-        "2,2,102,0,112,10,1,1,cup",
-        "2,2,1,0,11,10,1,2,jar",
-    ]
-    path = tmp_path / "boxes.csv"
-    header = "frame,timestamp,x1,y1,x2,y2,score,class_id,class_name"
-    path.write_text("\n".join([header, *rows]))
-    assert overlap_ids(read_detections(path), np.arange(6)).tolist() == [0, 1, 1, 2, 1, 2]
-
-
-@pytest.fixture
-def files(tmp_path):
-    return write_orbit(tmp_path, make_orbit(noise_px=1.0))
-
-
-def call(files, *more):
-    names = ("--camera", "--odometry", "--detections")
-    arguments = [str(word) for pair in zip(names, files, strict=True) for word in pair]
-    return main(["inspect", *arguments, *more])
-
-
-def test_the_summary(files, capsys):
-    assert call(files, "--ids", "track_id", "--json") == 0
-    content = json.loads(capsys.readouterr().out)
-    assert (content["warnings"], content["unchecked"]) == ([], {"distortion": TOO_FEW})
-    path, boxes = content["trajectory"], content["detections"]
-    assert (path["poses"], path["start_s"], path["gaps"]) == (40, 100, [])
-    assert path["rate_hz"] == pytest.approx(10)
-    assert path["length_m"] == pytest.approx(7.46, abs=0.5)  # round a circle of 1.2 m
-    assert (boxes["boxes"], boxes["frames"], boxes["boxes_a_frame"]) == (160, 40, [4.0] * 5)
-    assert boxes["classes"] == {"box": 40, "lamp": 40, "book": 40, "cup": 40}
-    assert (boxes["objects"], boxes["boxes_without_object"]) == (4, 0)
-    assert boxes["at_border"] == {"left": 0, "top": 0, "right": 0, "bottom": 0, "any": 0}
-    overlap = content["overlap"]
-    assert (overlap["boxes_with_pose"], overlap["boxes_without_pose"]) == (160, 0)
-    assert overlap["seconds"] == pytest.approx(3.9)
-
-
-TOO_FEW = "only 4 objects to tell a lens by"
-
-
-def test_gaps_borders_and_boxes_without_poses_are_counted(files, capsys):
-    camera, path, boxes = files
-    lines = path.read_text().splitlines(keepends=True)
-    path.write_text("".join(lines[:10] + lines[20:]))
-    text = boxes.read_text().splitlines(keepends=True)
-    text.append("39,103.9,-0.5,10,30,479.2,0.9,1,cup,101\n")
-    boxes.write_text("".join(text))
-    assert call(files, "--ids", "track_id", "--json") == 0
-    content = json.loads(capsys.readouterr().out)
-    (gap,) = content["trajectory"]["gaps"]
-    assert (gap["after_s"], gap["seconds"]) == (pytest.approx(100.9), pytest.approx(1.1))
-    # The boxes at 101.0 to 101.9 s have no pose within half an interval.
-    assert content["overlap"]["boxes_without_pose"] == 40
-    assert content["detections"]["at_border"]["left"] == 1
-    assert content["detections"]["at_border"]["bottom"] == 1
-    assert content["detections"]["at_border"]["any"] == 1
-
-
-def test_printed_and_strict(files, capsys):
-    assert call(files, "--ids", "track_id", "--strict") == 0
-    shown = capsys.readouterr().out
-    assert "no mistake found" in shown
-    assert f"not checked: distortion: {TOO_FEW}" in shown
-    camera = json.loads(files[0].read_text())
-    files[0].write_text(json.dumps(camera | {"width": 480, "height": 640}))
-    assert call(files, "--ids", "track_id") == 0
-    assert "warning: image size: the principal point" in capsys.readouterr().out
-    assert call(files, "--ids", "track_id", "--strict") == 3
-
-
-@pytest.mark.parametrize(
-    ("more", "message"),
-    [
-        (("--format", "bvh"), "format 'bvh' is none of"),
-        (("--camera", "none.json"), "none.json: no such file"),
-        (("--frame-rate", "0"), "frame rate is 0 Hz"),
-    ],
-)
-def test_bad_arguments_are_one_line_and_code_2(files, capsys, more, message):
-    assert call(files, *more) == 2
-    shown = capsys.readouterr()
-    assert message in shown.err
-    assert shown.err.count("\n") == 1
-
-
-def test_a_street_in_the_formats_of_kitti_and_mot(tmp_path, capsys):
-    """No file has times: frames are counted."""
-    folder = realdata.recording("kitti_tracking") / "0005"
-    boxes = tmp_path / "boxes.txt"
-    assert main(["convert", str(folder / "boxes_gt.csv"), str(boxes)]) == 0
-    calib = tmp_path / "calib.txt"
-    calib.write_text((folder / "calib.txt").read_text() + "S_rect_02: 1242 375\n")
-    path = folder / "poses_orbslam3_stereo_kitti3x4.txt"
-    capsys.readouterr()
-    assert call((calib, path, boxes), "--ids", "track_id", "--json") == 0
-    content = json.loads(capsys.readouterr().out)
-    assert (content["warnings"], content["unchecked"]) == ([], {})
-    assert content["overlap"]["boxes_with_pose"] == 1476
-
-
-def test_quiet_says_nothing_but_the_exit_code(files, capsys):
-    camera = json.loads(files[0].read_text())
-    files[0].write_text(json.dumps(camera | {"width": 480, "height": 640}))
-    assert call(files, "--ids", "track_id", "--strict", "--quiet") == 3
-    assert capsys.readouterr() == ("", "")

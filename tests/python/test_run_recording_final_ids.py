@@ -11,7 +11,6 @@ from dqslam.evaluate import position_error
 from dqslam.io import OdometryNoise, load_recording
 from dqslam.run_recording import perturb_odometry
 from dqslam.run_recording.final_ids import judge_again
-from orbit import make_orbit, write_orbit
 
 NOISE = OdometryNoise(translation_m=0.01, rotation_rad=0.01)
 
@@ -33,8 +32,8 @@ def test_a_right_box_that_was_refused_comes_back_and_straightens_the_path():
 
 
 @pytest.fixture
-def found(tmp_path):
-    recording, _ = load_recording(*write_orbit(tmp_path, make_orbit(noise_px=1.0)))
+def found(files):
+    recording, _ = load_recording(*files)
     return associate(perturb_odometry(recording, NOISE, seed=0), trust=1.0, estimates_noise=False)
 
 
