@@ -10,7 +10,13 @@ from numpy.typing import NDArray
 from dqslam import _core
 from dqslam.associate.assignment import assign
 from dqslam.associate.births import FEWEST_VIEWS, propose_groups
-from dqslam.associate.gating import CHI2_GATE, PredictedBoxes, pair_costs, predict_boxes
+from dqslam.associate.gating import (
+    CHI2_GATE,
+    PredictedBoxes,
+    in_image,
+    pair_costs,
+    predict_boxes,
+)
 from dqslam.associate.judge import find_misfits, join_duplicates
 from dqslam.associate.scene_map import SceneMap
 from dqslam.associate.thinning import transport
@@ -59,15 +65,15 @@ class Follower:
             scene.left_out = find_misfits(scene)
             progress(len(scene.poses) / end)
 
-    def assign_ahead(self, begin: int, end: int) -> None:
+    def assign_ahead(self, begin: int, end: int, *, strangers_only: bool = False) -> None:
         """Go on by odometry to some poses, and give their boxes to the objects they clearly show.
 
-        What is known of the path and the objects is that of the pose before ``begin``.
+        What is known of the path and the objects is that of the pose before ``begin``. Strangers
+        are boxes that wait and whose tracklets have no object.
         """
         scene = self.scene
-        known = np.flatnonzero(scene.box_counts > 0)
-        known, covariance = scene.joint_covariance(begin - 1, known)
         scene.extend(end)
+        known, covariance = scene.joint_covariance(begin - 1, self._in_view(begin, end))
         odometry = scene.recording.odometry
         k = odometry.covariance.shape[1]
         for pose in range(begin, end):
@@ -75,14 +81,34 @@ class Follower:
             covariance[:k] = moved @ covariance[:k]
             covariance[:, :k] = covariance[:, :k] @ moved.T
             covariance[:k, :k] += odometry.covariance[pose - 1]
-            self._assign(pose, known, covariance)
+            self._assign(pose, known, covariance, strangers_only=strangers_only)
 
-    def _assign(self, pose: int, known: NDArray[np.int64], covariance: NDArray[np.float64]) -> None:
+    def _in_view(self, begin: int, end: int) -> NDArray[np.int64]:
+        """Return the objects that some of the poses should see; no other is predicted."""
+        scene = self.scene
+        known = np.flatnonzero(scene.box_counts > 0)
+        camera, model = scene.recording.camera, scene.recording.odometry.pose_model
+        shown = np.zeros(len(known), dtype=bool)
+        for pose in scene.poses[begin:end]:
+            shown |= in_image(camera, model, pose, scene.ellipsoids[known])
+        return known[shown]
+
+    def _assign(
+        self,
+        pose: int,
+        known: NDArray[np.int64],
+        covariance: NDArray[np.float64],
+        *,
+        strangers_only: bool,
+    ) -> None:
         scene = self.scene
         rows = np.flatnonzero(scene.recording.detections.pose == pose)
-        if not rows.size or not known.size:
-            return
         predicted = predict(scene, pose, known, covariance)
+        if strangers_only:
+            predicted = predicted.without(np.isin(known, scene.box_object[rows]))
+            rows = rows[scene.are_strangers(rows)]
+        if not rows.size or not len(predicted.box):
+            return
         choice, margin = choose(scene, rows, known, predicted, self.bonus)
         for row, number, sure in zip(rows, choice.tolist(), margin, strict=True):
             tracklet = int(scene.tracklet[row])
@@ -105,9 +131,8 @@ class Follower:
         """Start the objects that waiting boxes agree on."""
         scene = self.scene
         recording = scene.recording
-        free = ~np.isin(scene.tracklet, list(scene.object_of_tracklet))
-        seen = recording.detections.pose < len(scene.poses)
-        waiting = np.flatnonzero(free & seen & (scene.box_object < 0))
+        seen = np.flatnonzero(recording.detections.pose < len(scene.poses))
+        waiting = seen[scene.are_strangers(seen)]
         if not waiting.size:
             return
         cameras = _core.world_from_camera(

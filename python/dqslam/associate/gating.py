@@ -52,6 +52,11 @@ class PredictedBoxes:
     covariance: NDArray[np.float64]
     """Of pose and object together, without the detector's noise, pixels^2, shape (p, 4, 4)."""
 
+    def without(self, objects: NDArray[np.bool_]) -> PredictedBoxes:
+        """Leave out some objects: a flag for each that ``object_row`` may name."""
+        kept = ~objects[self.object_row]
+        return PredictedBoxes(self.object_row[kept], self.box[kept], self.covariance[kept])
+
 
 def predict_boxes(
     camera: _core.Camera,
@@ -68,10 +73,7 @@ def predict_boxes(
     k = len(covariance) - 9 * count
     here = np.repeat(pose[None], count, axis=0)
     box, in_front = _core.project_to_boxes(pose_model, camera, here, ellipsoids)
-    limits = np.array([-0.5, -0.5, camera.width - 0.5, camera.height - 0.5])
-    visible = np.minimum(box[:, 2:], limits[2:]) - np.maximum(box[:, :2], limits[:2])
-    shown = in_front & np.all(visible > 0, axis=1)
-    row = np.flatnonzero(shown)
+    row = np.flatnonzero(in_front & _overlaps_image(camera, box, margin=0.0))
     if not row.size:
         return PredictedBoxes(row, np.zeros((0, 4)), np.zeros((0, 4, 4)))
     jacobian = _jacobian(camera, pose_model, here[row], ellipsoids[row], k)
@@ -85,6 +87,32 @@ def predict_boxes(
     variance = np.trace(np.nan_to_num(spread, nan=np.inf), axis1=1, axis2=2)
     known = np.isfinite(spread).all(axis=(1, 2)) & (variance < size**2)
     return PredictedBoxes(row[known], box[row[known]], spread[known])
+
+
+def in_image(
+    camera: _core.Camera,
+    pose_model: _core.PoseModel,
+    pose: NDArray[np.float64],
+    ellipsoids: NDArray[np.float64],
+    *,
+    margin: float = 0.0,
+) -> NDArray[np.bool_]:
+    """Tell which objects (o, 9) the image of a pose (d,) shows, wholly or in part.
+
+    ``margin`` is added to the image on all sides, as a part of its size.
+    """
+    here = np.repeat(pose[None], len(ellipsoids), axis=0)
+    box, in_front = _core.project_to_boxes(pose_model, camera, here, ellipsoids)
+    return np.asarray(in_front & _overlaps_image(camera, box, margin=margin))
+
+
+def _overlaps_image(
+    camera: _core.Camera, box: NDArray[np.float64], *, margin: float
+) -> NDArray[np.bool_]:
+    size = np.array([camera.width, camera.height])
+    first, last = -0.5 - margin * size, (1.0 + margin) * size - 0.5
+    overlap = np.minimum(box[:, 2:], last) - np.maximum(box[:, :2], first)
+    return np.asarray(np.all(overlap > 0, axis=1))
 
 
 def _jacobian(

@@ -27,9 +27,10 @@ NOT_HALF = 0.5
 # Of chi-square with 4 degrees of freedom.
 MEDIAN_CHI2 = 3.36
 # An object moved when without it the path explains its boxes worse than this, and with it pays
-# this much: chi-squares a box.
+# this much: chi-squares a box, and as a multiple of what is usual.
 BENT = 13.28
 PAID = 2.0
+PAID_MORE = 2.0
 LEAST_BOXES = 8
 # Share of the boxes of an id that one place explains, at least.
 LEAST_FIT = 0.5
@@ -38,9 +39,7 @@ LEAVE_ONE_OUT_ITERATIONS = 8
 
 def join_duplicates(scene: SceneMap) -> None:
     """Join objects of one class that may be in one place and are never seen together."""
-    alive = np.flatnonzero(scene.box_counts > 0)
-    alive = alive[~np.isin(alive, list(scene.left_out))]
-    pairs = _close_pairs(scene, alive)
+    pairs = close_pairs(scene)
     if not pairs:
         return
     involved = np.unique(pairs)
@@ -62,8 +61,10 @@ def join_duplicates(scene: SceneMap) -> None:
             scene.join_objects(kept, given_up)
 
 
-def _close_pairs(scene: SceneMap, alive: NDArray[np.int64]) -> list[tuple[int, int]]:
+def close_pairs(scene: SceneMap) -> list[tuple[int, int]]:
     """Return pairs of one class, a few sizes apart at most, that are not seen together."""
+    alive = np.flatnonzero(scene.box_counts > 0)
+    alive = alive[~np.isin(alive, list(scene.left_out))]
     if len(alive) < 2:
         return []
     size = np.exp(scene.log_sizes()[alive])
@@ -181,12 +182,15 @@ def _fits_without(scene: SceneMap, objects: list[int], movers: dict[int, str]) -
     The median chi-square of an object's boxes at one place, movers taking no part.
     """
     fits = {}
+    claimed = np.flatnonzero(scene.box_object >= 0)
+    chi2 = scene.chi2(claimed, scene.ellipsoids[scene.box_object[claimed]], blur=0.0)
+    least = max(PAID, PAID_MORE * float(np.median(chi2)))
     with_all = scene.cost(max_iterations=LEAVE_ONE_OUT_ITERATIONS, without=movers)
     for number in objects:
         rows = np.flatnonzero(scene.box_object == number)
         without = scene.cost(max_iterations=LEAVE_ONE_OUT_ITERATIONS, without=[*movers, number])
         paid = 2.0 * (with_all.cost - without.cost) / len(rows)
-        if paid < PAID:
+        if paid < least:
             continue
         with scene.at(without.poses):
             ellipsoids, _ = scene.fit_groups([rows])

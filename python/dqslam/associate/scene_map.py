@@ -127,6 +127,11 @@ class SceneMap:
         self.votes[:] = 0
         self.object_of_tracklet = {}
 
+    def are_strangers(self, rows: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Tell which boxes (b,) wait, of tracklets without an object."""
+        known = np.isin(self.tracklet[rows], list(self.object_of_tracklet))
+        return (self.box_object[rows] < 0) & ~known
+
     def class_probability(
         self, rows: NDArray[np.int64], objects: NDArray[np.int64]
     ) -> NDArray[np.float64]:

@@ -67,7 +67,7 @@ class Identifier:
         self._trust = trust
         self._linker = Linker(camera)
         self._chooser = KeyframeChooser()
-        self._reach = Reach(camera, pose_model)
+        self._reach = Reach()
         self._follower: Follower | None = None
         self._misfits: set[int] = set()
         self._leg = Leg.of_no_steps(pose_model)
@@ -124,21 +124,32 @@ class Identifier:
 
     def _identify(self, session: _core.Session, registry: Registry) -> None:
         """Find the objects of the last keyframe's boxes, and what else these tell."""
-        begin = self._reach.begin(self._journal, session)
-        part = self._part(session, begin)
-        follower = self._follow(part)
-        last = len(part.scene.poses) - 1
-        part.scene.poses = part.scene.poses[:last]  # the last one by odometry alone
-        follower.assign_ahead(last, last + 1)
-        self._cut_tracks(part)
+        part = self._part(session, self._reach.window(self._journal))
+        self._assign(part)
+        begin = self._reach.for_strangers(part, self._journal)
         self._tell(session, registry, part)
+        if begin < part.begin:
+            part = self._part(session, begin)
+            self._assign(part, strangers_only=True)
+            self._tell(session, registry, part)
         session.smooth(ITERATIONS, begin=self._journal.keyframes[-RECENT:][0].pose)
         self._refresh(session, part)
-        follower.give_birth()
+        self._follow(part).give_birth()
         self._assign_again(part)
         if len(self._journal.keyframes) % JUDGE_EVERY == 0:
+            begin = self._reach.for_duplicates(part, self._journal)
+            if begin < part.begin:
+                self._tell(session, registry, part)
+                part = self._part(session, begin)
             self._judge(part)
         self._tell(session, registry, part)
+
+    def _assign(self, part: Part, *, strangers_only: bool = False) -> None:
+        """Give boxes of the last keyframe to objects, its pose being that of odometry."""
+        last = len(part.scene.poses) - 1
+        part.scene.poses = part.scene.poses[:last]
+        self._follow(part).assign_ahead(last, last + 1, strangers_only=strangers_only)
+        self._cut_tracks(part)
 
     def _part(self, session: _core.Session, begin: int) -> Part:
         return cut_part(

@@ -1,63 +1,82 @@
-"""How many keyframes back the association must look, for objects that come into view again."""
+"""How many keyframes back the association looks, for objects that come into view again.
+
+The covariance of where something was seen long ago, as seen from here, is that of the path
+between: work as large as the loop. So much is looked at all the time; more is paid from what has
+been saved, which keeps the work of a keyframe bounded in the mean.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
-from dqslam import _core
-from dqslam._checks import Floats
+from dqslam.associate.gating import in_image
+from dqslam.associate.judge import close_pairs
 from dqslam.online.journal import Journal
+from dqslam.online.part import Part
 
-# Keyframes that are always looked at.
+# Keyframes that are always looked at, and what each earns: as much again, now or later.
 WINDOW = 40
+EARNED = 1.0
 # Boxes of an object that tell where it is: if the window has fewer, its last ones are looked at.
 ENOUGH_BOXES = 8
-# One that was expected and not seen is not expected for so many keyframes, then twice as many.
-FIRST_PAUSE, LONGEST_PAUSE = 2, 64
 # Objects are expected this far outside of the image, as a part of its size: the path may be off.
 MARGIN = 0.5
 
 
 class Reach:
-    """Tells where the part of the path begins that a keyframe is compared with."""
+    """Tells where the part of the path begins that the last keyframe is compared with."""
 
-    def __init__(self, camera: _core.Camera, pose_model: _core.PoseModel) -> None:
-        """Begin without expectations."""
-        self._camera = camera
-        self._pose_model = pose_model
-        self._pauses: dict[int, tuple[int, int]] = {}  # of an object: until when, and how long
+    def __init__(self) -> None:
+        """Begin without savings."""
+        self._saved = 0.0  # in windows
+        self._asked: dict[tuple[int, int], int] = {}  # of a pair: boxes that were known
 
-    def begin(self, journal: Journal, session: _core.Session) -> int:
-        """Return the first keyframe to look at, once the last one is in the journal."""
+    def window(self, journal: Journal) -> int:
+        """Return the first keyframe that is always looked at."""
+        self._saved += EARNED
+        return max(len(journal.keyframes) - 1 - WINDOW, 0)
+
+    def for_strangers(self, part: Part, journal: Journal) -> int:
+        """Return the first keyframe to look at for boxes that no object of the part explains."""
+        scene = part.scene
         last = len(journal.keyframes) - 1
-        begin = max(last - WINDOW, 0)
-        if begin == 0:
-            return begin
-        called = set(journal.keyframes[last].class_id.tolist())
-        pose = session.pose_at(journal.keyframes[last].pose)
-        for number in self._in_view(pose, session.ellipsoids):
-            seen = journal.keyframes_of(number)
-            if not seen or journal.votes[number].argmax() not in called:
-                continue
-            anchor = seen[-min(ENOUGH_BOXES, len(seen))]
-            if seen[-1] >= last - 1:  # the last keyframe showed it
-                self._pauses.pop(number, None)
-            if anchor < begin and self._is_expected(number, last):
-                begin = anchor
+        rows = np.flatnonzero(scene.recording.detections.pose == last - part.begin)
+        called = np.unique(scene.box_class[rows[scene.are_strangers(rows)]])
+        if not called.size or part.begin == 0:
+            return part.begin
+        alive = np.flatnonzero(scene.box_counts > 0)
+        alive = alive[np.isin(scene.votes[alive].argmax(axis=1), called)]
+        near = in_image(
+            scene.recording.camera,
+            scene.recording.odometry.pose_model,
+            scene.poses[-1],
+            scene.ellipsoids[alive],
+            margin=MARGIN,
+        )
+        return self._afford([_anchor(journal, number) for number in alive[near]], part, last)
+
+    def for_duplicates(self, part: Part, journal: Journal) -> int:
+        """Return the first keyframe to look at for objects that may be older ones."""
+        near = set(np.unique(part.scene.box_object).tolist())
+        anchors = []
+        for pair in close_pairs(part.scene):
+            boxes = min(len(journal.boxes_of(number)) for number in pair)
+            one_is_near = len(near.intersection(pair)) == 1
+            if one_is_near and boxes >= max(ENOUGH_BOXES, 2 * self._asked.get(pair, 0)):
+                self._asked[pair] = boxes
+                anchors.append(min(_anchor(journal, number) for number in pair))
+        return self._afford(anchors, part, len(journal.keyframes) - 1)
+
+    def _afford(self, anchors: list[int], part: Part, last: int) -> int:
+        """Return the earliest of some keyframes that the savings reach, and pay for it."""
+        reached = [one for one in anchors if (last - one) / WINDOW <= self._saved]
+        begin = min([part.begin, *reached])
+        if begin < part.begin:
+            self._saved -= (last - begin) / WINDOW
         return begin
 
-    def _is_expected(self, number: int, keyframe: int) -> bool:
-        until, pause = self._pauses.get(number, (0, FIRST_PAUSE))
-        if keyframe < until:
-            return False
-        self._pauses[number] = (keyframe + pause, min(2 * pause, LONGEST_PAUSE))
-        return True
 
-    def _in_view(self, pose: Floats, ellipsoids: Floats) -> list[int]:
-        if not len(ellipsoids):
-            return []
-        here = np.repeat(pose[None], len(ellipsoids), axis=0)
-        box, in_front = _core.project_to_boxes(self._pose_model, self._camera, here, ellipsoids)
-        size = np.array([self._camera.width, self._camera.height])
-        inside = np.all((box[:, 2:] > -MARGIN * size) & (box[:, :2] < (1 + MARGIN) * size), axis=1)
-        return np.flatnonzero(in_front & inside).tolist()
+def _anchor(journal: Journal, number: int) -> int:
+    """Return the keyframe from which on there are enough boxes of an object."""
+    seen = journal.keyframes_of(number)
+    return seen[-min(ENOUGH_BOXES, len(seen))] if seen else len(journal.keyframes) - 1

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dqslam import _core
-from dqslam._checks import Ints
+from dqslam._checks import Floats, Ints
 from dqslam.associate import FINAL
 from dqslam.associate.follow import Follower
 from dqslam.associate.refine import refine
@@ -39,6 +39,7 @@ class Refinement:
         self._options = options
         self._copy = session.clone()
         self._keyframes = np.array([frame.pose for frame in journal.keyframes])
+        self._first_pose = session.pose_at(0)
         self._trust = trust
         self._noise = journal.odometry_noise
 
@@ -60,9 +61,16 @@ class Refinement:
         graph, seen = copy.to_graph()
         if not seen:
             return NOTHING
-        poses = bend_path(graph.pose_model, graph.initial_poses, self._keyframes, scene.poses)
-        start = _core.State(poses, scene.ellipsoids[rows[seen]])
+        start = _core.State(self._bent(graph), scene.ellipsoids[rows[seen]])
         return polished(_core.solve(graph, self._options, start), part.objects, rows[seen].tolist())
+
+    def _bent(self, graph: _core.Graph) -> Floats:
+        """Return odometry bent to the poses of the keyframes, (n, d); the path begins where it does."""
+        keyframes, poses = self._keyframes, self._part.scene.poses
+        if keyframes[0] > 0:
+            keyframes = np.concatenate([[0], keyframes])
+            poses = np.concatenate([self._first_pose[None], poses])
+        return bend_path(graph.pose_model, graph.initial_poses, keyframes, poses)
 
     def merge(self, found: Polished) -> None:
         """Tell the session what was found; boxes that have found an object meanwhile keep it."""
