@@ -65,7 +65,7 @@ class Refinement:
         return polished(_core.solve(graph, self._options, start), part.objects, rows[seen].tolist())
 
     def _bent(self, graph: _core.Graph) -> Floats:
-        """Return odometry bent to the poses of the keyframes, (n, d); the path begins where it does."""
+        """Return odometry bent to where the keyframes are, its first pose kept, (n, d)."""
         keyframes, poses = self._keyframes, self._part.scene.poses
         if keyframes[0] > 0:
             keyframes = np.concatenate([[0], keyframes])
