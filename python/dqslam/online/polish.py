@@ -135,7 +135,7 @@ class Polisher:
             Thread(target=run, name="dqslam-polish", daemon=True).start()
         else:
             run()
-        self.take(wait=not background)
+            self.take()
         return found
 
     def take(self, *, wait: bool = False) -> None:
