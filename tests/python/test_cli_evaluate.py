@@ -4,6 +4,7 @@ from pathlib import Path
 import pytest
 
 import planted
+from console import assert_one_line_of_error
 from dqslam.cli import main
 
 
@@ -96,10 +97,7 @@ def test_without_boxes_it_says_so(files, capsys):
 )
 def test_bad_arguments_are_one_line_and_code_2(files, capsys, arguments, message):
     assert call(files, *arguments) == 2
-    shown = capsys.readouterr()
-    assert shown.out == ""
-    assert message in shown.err
-    assert shown.err.count("\n") == 1
+    assert_one_line_of_error(capsys, message)
     assert not (files.results / "evaluation.json").exists()
 
 

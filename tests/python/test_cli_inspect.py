@@ -5,6 +5,7 @@ import json
 import pytest
 
 import realdata
+from console import assert_one_line_of_error
 from dqslam.cli import main
 
 TOO_FEW = "only 4 objects to tell a lens by"
@@ -73,9 +74,7 @@ def test_printed_and_strict(files, capsys):
 )
 def test_bad_arguments_are_one_line_and_code_2(files, capsys, more, message):
     assert call(files, *more) == 2
-    shown = capsys.readouterr()
-    assert message in shown.err
-    assert shown.err.count("\n") == 1
+    assert_one_line_of_error(capsys, message)
 
 
 def test_a_street_in_the_formats_of_kitti_and_mot(tmp_path, capsys):

@@ -3,6 +3,7 @@ import json
 import numpy as np
 import pytest
 
+from console import assert_one_line_of_error
 from dqslam.cli import main
 from dqslam.cli.run import parse_noise
 from dqslam.io import OdometryNoise, read_trajectory
@@ -171,10 +172,7 @@ def test_same_seed_same_files(files):
 )
 def test_bad_arguments_are_one_line_and_code_2(files, capsys, arguments, message):
     assert call(files, *arguments) == 2
-    shown = capsys.readouterr()
-    assert shown.out == ""
-    assert message in shown.err
-    assert shown.err.count("\n") == 1
+    assert_one_line_of_error(capsys, message)
 
 
 @pytest.mark.parametrize(
@@ -196,10 +194,7 @@ def test_bad_files_are_one_line_and_code_2(files, capsys, file, old, new, messag
     assert old in text
     files[file].write_text(text.replace(old, new, 1))
     assert call(files) == 2
-    shown = capsys.readouterr()
-    assert shown.out == ""
-    assert message in shown.err
-    assert shown.err.count("\n") == 1
+    assert_one_line_of_error(capsys, message)
 
 
 def test_an_output_that_is_a_file(files, capsys):

@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
-from itertools import product
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any
 
-import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
+from pydantic import Field
 
 from dqslam._files import FileError, FileErrors
 from dqslam.config import TomlFile, check_model, read_toml, right_keys, unknown_keys
 from dqslam.scenario import Scenario, load_scenario
 from dqslam.sweep.settings import TrialSettings
-
-Location = tuple[str | int, ...]
+from dqslam.sweep.varied import (
+    CellFile,
+    FileModel,
+    Location,
+    Value,
+    combinations,
+    leaves,
+    read_grid,
+    read_random,
+    refuse_twice,
+)
 
 
 @dataclass(frozen=True)
@@ -44,38 +50,7 @@ class Sweep:
         return tuple(self.cells[0].values)
 
 
-class _Model(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class _Range(_Model):
-    low: float
-    high: float
-    log: bool = False
-    """Whether the logarithm is uniform."""
-    whole: bool = False
-    """Whether numbers are whole, both ends among them."""
-
-    @model_validator(mode="after")
-    def _is_a_range(self) -> Self:
-        if not self.low < self.high:
-            raise ValueError(f"low, {self.low:g}, is not below high, {self.high:g}")
-        if self.log and self.low <= 0.0:
-            raise ValueError("log: low is not above 0")
-        if self.whole and (self.log or self.low % 1 or self.high % 1):
-            raise ValueError("whole: expected whole low and high, and no log")
-        return self
-
-    def draw(self, uniform: float) -> float | int:
-        """Turn a number from 0 to 1, without 1, into one of the range."""
-        if self.whole:
-            return int(self.low + np.floor(uniform * (self.high - self.low + 1.0)))
-        if self.log:
-            return float(self.low * (self.high / self.low) ** uniform)
-        return float(self.low + (self.high - self.low) * uniform)
-
-
-class _File(_Model):
+class _File(FileModel):
     """What a file may say at its top; its tables are checked setting by setting."""
 
     scenario: str
@@ -92,30 +67,6 @@ class _File(_Model):
     random: dict[str, Any] = {}
 
 
-@dataclass(frozen=True)
-class _Value:
-    """A value that a setting takes, and where it stands in the file."""
-
-    location: Location
-    value: Any
-
-
-_Varied = dict[str, list[_Value]]
-"""The values of each setting, by its dotted name."""
-
-
-@dataclass(frozen=True)
-class _CellFile(TomlFile):
-    """The file, as if it said the settings of one cell."""
-
-    cell_lines: Mapping[Location, int]
-
-    @cached_property
-    def lines(self) -> dict[Location, int]:
-        """The line of each setting that the file gives a value."""
-        return dict(self.cell_lines)
-
-
 def load_sweep(path: str | Path) -> Sweep:
     """Read the file of a sweep.
 
@@ -130,13 +81,14 @@ def load_sweep(path: str | Path) -> Sweep:
     said = _top(file, mistakes)
     scenario = _scenario(file, said, mistakes)
     fixed = {
-        name: [_Value(location, value)] for name, location, value in _leaves(("fixed",), said.fixed)
+        name: [Value(location, value)] for name, location, value in leaves(("fixed",), said.fixed)
     }
-    grid, random = _grid(file, said, mistakes), _random(file, said, mistakes)
-    _refuse_twice(file, (fixed, grid, random), mistakes)
+    grid = read_grid(file, said.grid, mistakes)
+    random = read_random(file, said.random, mistakes, samples=said.samples, seed=said.sample_seed)
+    refuse_twice(file, (fixed, grid, random), mistakes)
     _refuse_unknown(file, scenario, said, mistakes)
     cells = []
-    for values, places in _combinations(said.samples, fixed, grid, random):
+    for values, places in combinations(said.samples, fixed, grid, random):
         try:
             content, as_cell = _cell(file, said, scenario, values, places)
             settings = check_model(TrialSettings, content, as_cell)
@@ -175,87 +127,14 @@ def _scenario(file: TomlFile, said: _File, mistakes: list[FileError]) -> Scenari
     return None
 
 
-def _leaves(location: Location, table: Mapping[str, Any]) -> Iterator[tuple[str, Location, Any]]:
-    """Yield dotted name, location and value of what is inside; names may be in quotes or not."""
-    for key, value in table.items():
-        here = (*location, key)
-        if isinstance(value, dict) and not _Range.model_fields.keys() & value.keys():
-            yield from _leaves(here, value)
-        else:
-            yield ".".join(map(str, here[1:])), here, value
-
-
-def _grid(file: TomlFile, said: _File, mistakes: list[FileError]) -> _Varied:
-    grid: _Varied = {}
-    for name, location, values in _leaves(("grid",), said.grid):
-        if not isinstance(values, list) or not values:
-            mistakes.append(file.error(location, f"{name}: expected values, like [1, 2]"))
-            continue
-        for index, value in enumerate(values):
-            if value in values[:index]:
-                mistakes.append(file.error((*location, index), f"{name}: {value!r} stands twice"))
-        grid[name] = [_Value((*location, index), value) for index, value in enumerate(values)]
-    return grid
-
-
-def _random(file: TomlFile, said: _File, mistakes: list[FileError]) -> _Varied:
-    """Draw values; those of a setting depend on nothing else, so that more samples add to them."""
-    if said.samples > 1 and not said.random:
-        mistakes.append(file.error(("samples",), "samples: no setting is random"))
-    random: _Varied = {}
-    for name, location, limits in _leaves(("random",), said.random):
-        if not isinstance(limits, dict):
-            message = f"{name}: expected a range, like {{ low = 1.0, high = 2.0 }}"
-            mistakes.append(file.error(location, message))
-            continue
-        named: Any = create_model("Named", __base__=_Model, limits=(_Range, Field(alias=name)))
-        depth = len(location)
-        lines = {
-            (name, *one[depth:]): line
-            for one, line in file.lines.items()
-            if one[:depth] == location
-        }
-        try:
-            checked: Any = check_model(named, {name: limits}, _CellFile(file.path, "", {}, lines))
-        except FileErrors as error:
-            mistakes += error.errors
-            continue
-        draws = np.random.default_rng([said.sample_seed, *name.encode()]).random(said.samples)
-        random[name] = [_Value(location, checked.limits.draw(draw)) for draw in draws.tolist()]
-    return random
-
-
-def _refuse_twice(file: TomlFile, tables: Sequence[_Varied], mistakes: list[FileError]) -> None:
-    seen: set[str] = set()
-    for name, values in [item for table in tables for item in table.items()]:
-        if name in seen:
-            mistakes.append(file.error(values[0].location, f"{name} is in another table too"))
-        seen.add(name)
-
-
 def _refuse_unknown(
     file: TomlFile, scenario: Scenario | None, said: _File, mistakes: list[FileError]
 ) -> None:
     """Refuse misspelt names whose values are wrong too, which are part of no cell."""
     for table in ("grid", "random"):
-        for name, place, value in _leaves((table,), getattr(said, table)):
+        for name, place, value in leaves((table,), getattr(said, table)):
             content, as_cell = _cell(file, said, scenario, {name: value}, {name: place})
             mistakes += unknown_keys(TrialSettings, content, as_cell)
-
-
-def _combinations(
-    samples: int, fixed: _Varied, grid: _Varied, random: _Varied
-) -> Iterator[tuple[dict[str, Any], dict[str, Location]]]:
-    """Yield the values of each cell and their locations: the grid, its last setting fastest."""
-    for chosen in product(*grid.values()):
-        for sample in range(samples):
-            cell = {name: values[0] for name, values in fixed.items()}
-            cell |= dict(zip(grid, chosen, strict=True))
-            cell |= {name: values[sample] for name, values in random.items()}
-            yield (
-                {name: one.value for name, one in cell.items()},
-                {name: one.location for name, one in cell.items()},
-            )
 
 
 def _cell(
@@ -264,7 +143,7 @@ def _cell(
     scenario: Scenario | None,
     values: Mapping[str, Any],
     places: Mapping[str, Location],
-) -> tuple[dict[str, Any], _CellFile]:
+) -> tuple[dict[str, Any], CellFile]:
     """Put values into the settings of a scenario and of the default estimator.
 
     Without a scenario its settings are left out: nobody knows which are right.
@@ -291,7 +170,7 @@ def _cell(
                 table[step] = {}
             table = table[step]
         table[steps[-1]] = value
-    return content, _CellFile(file.path, "", content, lines)
+    return content, CellFile(file.path, "", content, lines)
 
 
 def _line(file: TomlFile, location: Location) -> int:
