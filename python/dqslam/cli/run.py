@@ -25,10 +25,9 @@ from dqslam.cli.settings import CONFIG, ConfigFile, save_settings
 
 if TYPE_CHECKING:
     from dqslam.io import OdometryNoise
+    from dqslam.run_recording import RunResult
 
 NOISE = "translation=0.02,rotation=0.01"
-# Of tracklets that are linked in the image: 1 in 10 goes over to another object.
-UNSURE = 0.9
 
 
 def run(
@@ -113,6 +112,7 @@ def run(
     report.json and config.toml.
     """
     from dqslam import _core, io, run_recording
+    from dqslam.associate import FINAL, UNSURE
     from dqslam.size_prior import load_size_priors
 
     sizes = None if size_priors is None else load_size_priors(size_priors)
@@ -122,9 +122,7 @@ def run(
         raise ValueError("--odometry-covariance: the noise is given already, by another option")
     if online and mode == "mapping":
         raise ValueError("--online: does not go with --mode mapping")
-    final = trust_ids == 1.0 and ids != "none"
-    trust = 1.0 if final else min(trust_ids, UNSURE)
-    estimates_noise = believed is None and odometry_covariance is None
+    final = trust_ids == FINAL and ids != "none"
     names = io.split_formats(formats or [])
     frames = io.choose_frame_times(odometry, detections, names, times=frame_times, rate=frame_rate)
     reference, reference_name = None, None
@@ -133,6 +131,14 @@ def run(
     elif added is not None:
         reference = io.read_trajectory(odometry, names.trajectory, frames=frames)
         reference_name = "odometry before the added noise"
+    how: dict[str, Any] = {
+        "trust_ids": FINAL if final else min(trust_ids, UNSURE),
+        "reference": reference,
+        "size_prior": sizes,
+        "estimates_noise": believed is None and odometry_covariance is None,
+        "hold_out": hold_out,
+        "seed": seed,
+    }
     output = Output(quiet=quiet, as_json=json)
     with results_directory(out), _progress(output, online=online) as progress:
         recording, dropped = io.load_recording(
@@ -157,25 +163,12 @@ def run(
 
             result = run_online(
                 recording,
-                trust_ids=trust,
-                reference=reference,
-                size_prior=sizes,
-                estimates_noise=estimates_noise,
-                hold_out=hold_out,
-                seed=seed,
                 show=lambda slam, frame: progress(describe_step(slam, frame)),
+                **how,
             )
         else:
             result = run_recording.run(
-                recording,
-                trust_ids=trust,
-                mode=_core.Mode[mode.upper()],
-                reference=reference,
-                size_prior=sizes,
-                estimates_noise=estimates_noise,
-                hold_out=hold_out,
-                seed=seed,
-                progress=progress,
+                recording, mode=_core.Mode[mode.upper()], progress=progress, **how
             )
     report = {
         "camera": str(camera),
@@ -192,6 +185,15 @@ def run(
         "reference": reference_name,
         **result.report,
     }
+    _write(context, out, result, report)
+    output.document(report)
+    show_report(output, report)
+    output.line(f"wrote {out}")
+
+
+def _write(context: typer.Context, out: Path, result: "RunResult", report: dict[str, Any]) -> None:
+    from dqslam import io
+
     with uninterrupted():
         io.save_estimate(
             result.estimate,
@@ -202,9 +204,6 @@ def run(
         )
         io.write_json(out / "report.json", report)
         save_settings(context, out / CONFIG)
-    output.document(report)
-    show_report(output, report)
-    output.line(f"wrote {out}")
 
 
 def _progress(output: Output, *, online: bool) -> AbstractContextManager[Callable[[Any], None]]:

@@ -13,6 +13,7 @@ from dqslam.plot.style import (
     ODOMETRY,
     SKY,
     column_style,
+    legend_above,
     new_figure,
 )
 
@@ -83,10 +84,4 @@ def _draw_legend(figure: "Figure", *, has_band: bool, has_odometry: bool) -> Non
         handles.insert(0, Line2D([], [], color=ODOMETRY, linewidth=0.8, label="odometry"))
     if has_band:
         handles.append(Patch(color=SKY, alpha=0.35, linewidth=0, label="3σ, claimed"))
-    figure.legend(
-        handles=handles,
-        loc="outside upper center",
-        ncols=len(handles),
-        frameon=False,
-        borderpad=0.1,
-    )
+    legend_above(figure, handles)

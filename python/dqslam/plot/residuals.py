@@ -6,7 +6,15 @@ import numpy as np
 
 from dqslam._checks import Floats
 from dqslam.evaluate_results import BoxFits
-from dqslam.plot.style import COLUMN_INCHES, GREY, ORANGE, SKY, column_style, new_figure
+from dqslam.plot.style import (
+    COLUMN_INCHES,
+    GREY,
+    ORANGE,
+    SKY,
+    column_style,
+    legend_above,
+    new_figure,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -85,10 +93,4 @@ def _draw_legend(figure: "Figure", *, any_held_out: bool) -> None:
     ]
     if any_held_out:
         handles.insert(1, Line2D([], [], color=ORANGE, label="held out"))
-    figure.legend(
-        handles=handles,
-        loc="outside upper center",
-        ncols=len(handles),
-        frameon=False,
-        borderpad=0.1,
-    )
+    legend_above(figure, handles)

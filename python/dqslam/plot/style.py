@@ -2,7 +2,7 @@
 
 import contextlib
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +20,7 @@ from dqslam._colors import YELLOW as YELLOW
 from dqslam._files import FileError, whole_file
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.figure import Figure
 
 # Of classes: first those that no path has.
@@ -77,6 +78,17 @@ def class_styles(class_names: Iterable[str]) -> dict[str, dict[str, Any]]:
             "linestyle": _CLASS_LINES[turn % len(_CLASS_LINES)],
         }
     return styles
+
+
+def legend_above(figure: "Figure", handles: "Sequence[Artist]") -> None:
+    """Put a legend of one line above all axes."""
+    figure.legend(
+        handles=handles,
+        loc="outside upper center",
+        ncols=len(handles),
+        frameon=False,
+        borderpad=0.1,
+    )
 
 
 def save_figure(figure: "Figure", path: str | Path, *, dpi: float = _DPI) -> None:
