@@ -132,6 +132,7 @@ def test_all_mistakes_are_said_at_once_with_their_lines(settings, capsys):
         ("sweep", "job = 1\n", "my.toml:1: unknown key job; did you mean jobs?"),
         ("plot", 'format = "gif"\n', "my.toml:1: format: Input should be 'svg', 'png' or 'pdf'"),
         ("plot", "video_rate = 0.0\n", "my.toml:1: video_rate: Input should be greater than or"),
+        ("convert", "topics = 1\n", "my.toml:1: unknown key topics; did you mean topic?"),
         ("view", "port = 0\n", "my.toml:1: port: Input should be greater than or equal to 1"),
         ("view", 'command = "plot"\n', "my.toml:1: command: Input should be 'view', not 'plot'"),
         ("paper", "bound = 1\n", "my.toml:1: bound: Input should be a valid boolean"),

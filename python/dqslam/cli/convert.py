@@ -7,6 +7,7 @@ import typer
 
 from dqslam.cli.options import FrameRate, FrameTimesFile
 from dqslam.cli.output import Json, Output, Quiet
+from dqslam.cli.settings import ConfigFile
 
 
 def convert(
@@ -37,6 +38,7 @@ def convert(
     topic: Annotated[
         list[str] | None, typer.Option(metavar="NAME", help="Of a bag with several; repeatable.")
     ] = None,
+    config: ConfigFile = None,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
