@@ -171,3 +171,14 @@ def table_things(count=8, seed=0):
         semi_axes = random.uniform(0.03, 0.06, 3)
         things.append(Thing(center, semi_axes, class_id=1 if i % 2 else 3, turn=turn))
     return things
+
+
+def switched_ids(made):
+    """Return the ids of a tracker that gives new ones every 15 images, and mixes two up, (m,)."""
+    pose = made.recording.detections.pose
+    ids = made.thing + 10 * (pose // 15)
+    switched = ids.copy()
+    switched[(pose >= 20) & (ids == 11)] = 13
+    switched[(pose >= 20) & (ids == 13)] = 11
+    assert np.any(switched != ids)
+    return switched

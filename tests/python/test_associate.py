@@ -12,7 +12,7 @@ from dqslam.associate.association import _cut_alike
 from dqslam.evaluate import score_association
 from dqslam.io import OdometryNoise
 from dqslam.problem import BoxNoise
-from scenes import Film, Thing, film, orbit_poses, street_poses, table_things
+from scenes import Film, Thing, film, orbit_poses, street_poses, switched_ids, table_things
 from test_associate_judge import circle
 
 NOISE = OdometryNoise(0.02, 0.01)
@@ -74,15 +74,9 @@ def test_noise_is_estimated_as_well():
 
 
 def test_ids_that_switch_are_cut_and_joined():
-    """A tracker that gives a new id every 15 images, and mixes two up for the rest of them."""
     made = table(0, false_positives=0.0)
-    pose = made.recording.detections.pose
-    ids = made.thing + 10 * (pose // 15)
-    swapped = ids.copy()
-    swapped[(pose >= 20) & (ids == 11)] = 13
-    swapped[(pose >= 20) & (ids == 13)] = 11
-    assert np.any(swapped != ids)
-    found = associate(made.with_ids(swapped), trust=0.9, estimates_noise=False, box_noise=BOXES)
+    switched = made.with_ids(switched_ids(made))
+    found = associate(switched, trust=0.9, estimates_noise=False, box_noise=BOXES)
     assert_found(made, found)
 
 

@@ -1,6 +1,7 @@
 """Boxes of a session without ids: which objects they show, as they arrive and after a polish."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,9 +12,11 @@ from dqslam.associate.thinning import thin_recording
 from dqslam.evaluate import score_association
 from dqslam.io import OdometryNoise
 from dqslam.online import Motion, OnlineSlam, StepBoxes, StepError, replay, steps_of
+from dqslam.online.journal import Journal
 from dqslam.online.leg import Leg
+from dqslam.online.reach import Reach
 from dqslam.problem import BoxNoise
-from scenes import CAMERA, Film, Thing, film, orbit_poses, table_things
+from scenes import CAMERA, Film, Thing, film, orbit_poses, switched_ids, table_things
 from test_associate_judge import circle
 
 NOISE = OdometryNoise(0.02, 0.01)
@@ -104,14 +107,8 @@ def test_the_level_of_the_noise_is_estimated():
 
 
 def test_ids_that_switch_are_cut_and_joined():
-    """A tracker that gives a new id every 15 images, and mixes two up for the rest of them."""
     made = table(0, false_positives=0.0)
-    pose = made.recording.detections.pose
-    ids = made.thing + 10 * (pose // 15)
-    swapped = ids.copy()
-    swapped[(pose >= 20) & (ids == 11)] = 13
-    swapped[(pose >= 20) & (ids == 13)] = 11
-    slam = followed(made, made.with_ids(swapped))
+    slam = followed(made, made.with_ids(switched_ids(made)))
     slam.polish()
     assert_found(made, slam, recall=0.9)
 
@@ -227,6 +224,21 @@ def test_a_leg_is_what_thinning_makes_of_its_steps():
     np.testing.assert_allclose(leg.covariance, thin.covariance[0], rtol=1e-9, atol=1e-15)
     levels = 0.02**2 * leg.per_translation + 0.01**2 * leg.per_rotation
     np.testing.assert_allclose(levels, leg.covariance, rtol=1e-9, atol=1e-15)
+
+
+def test_a_look_far_back_is_paid_from_savings():
+    """Windows of 40 keyframes, one earned at each: 100 keyframes back cost two and a half."""
+    reach, journal = Reach(), Journal(None)
+    journal.keyframes = [None] * 161
+    part = SimpleNamespace(begin=120)
+    for _ in range(3):
+        assert reach.window(journal) == 120
+    assert reach._afford([40, 60], part, last=160) == 40
+    assert reach._afford([60], part, last=160) == 120  # nothing is left
+    reach.window(journal)
+    reach.window(journal)
+    assert reach._afford([60, 100], part, last=160) == 100
+    assert reach._afford([], part, last=160) == 120
 
 
 def test_a_drive_in_the_plane():
