@@ -4,7 +4,16 @@ import numpy as np
 import pytest
 
 from dqslam.cli import main
-from dqslam.io import FileError, convert, read_camera, read_detections, read_mount, read_trajectory
+from dqslam.io import (
+    ConvertContext,
+    FileError,
+    convert,
+    frame_rate,
+    read_camera,
+    read_detections,
+    read_mount,
+    read_trajectory,
+)
 
 CAMERA = {"fx": 500.5, "fy": 501, "cx": 320.25, "cy": 240, "width": 640, "height": 480}
 BOXES = """frame,timestamp,x1,y1,x2,y2,score,class_id,class_name,track_id
@@ -206,7 +215,8 @@ def test_a_bag_becomes_a_folder(folder, call):
     ]
     shares = []
     convert(folder / "bag", folder / "told", progress=shares.append)
-    assert shares == [1 / 3, 2 / 3, 1.0]
+    # The camera; two messages of odometry, and their file; one of boxes, and its file.
+    np.testing.assert_allclose(shares, [1 / 3, 1 / 2, 2 / 3, 2 / 3, 1.0, 1.0])
     assert "no place" not in call("bag alone.txt --to tum")
     assert (folder / "alone.txt").read_text() == (folder / "out/trajectory.txt").read_text()
     assert "out: is there already, and not empty" in call("bag out")
@@ -215,6 +225,19 @@ def test_a_bag_becomes_a_folder(folder, call):
     assert not (folder / "twice").exists()
     assert "1 poses as tum" in call("two twice --topic /b")
     assert "no topic /c that can be read (it has: /a, /b, /boxes)" in call("two third --topic /c")
+
+
+def test_a_folder_tells_how_many_of_its_files_are_read(folder):
+    (folder / "yolo").mkdir()
+    for frame in range(4):
+        (folder / "yolo" / f"{frame}.txt").write_text("0 0.5 0.5 0.1 0.1\n")
+    shares = []
+    context = ConvertContext(size=(640, 480), frames=frame_rate(10.0))
+    convert(folder / "yolo", folder / "o.csv", context=context, progress=shares.append)
+    assert shares == [0.25, 0.5, 0.75, 1.0]
+    shares.clear()
+    convert(folder / "o.csv", folder / "o.json", progress=shares.append)
+    assert shares == []  # of one file it is not known
 
 
 def test_quiet_and_json(folder, call):

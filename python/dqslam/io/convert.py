@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from dqslam.io.camera.rosbag import KIND as CAMERA_INFO
 from dqslam.io.detections import DETECTION_FORMATS, DetectionTable, read_detections
 from dqslam.io.detections.rosbag import KIND as DETECTION_ARRAY
 from dqslam.io.files import FileError, whole_folder
-from dqslam.io.formats import Format, choose_format
+from dqslam.io.formats import Format, Progress, choose_format, tell_nobody
 from dqslam.io.frames import BY_NUMBER, FrameTimes, write_frame_times
 from dqslam.io.rosbag import NAME as BAG
 from dqslam.io.rosbag import bag_topics
@@ -63,7 +64,7 @@ def convert(
     to: str | None = None,
     topics: Sequence[str] = (),
     context: ConvertContext | None = None,
-    progress: Callable[[float], None] = lambda share: None,
+    progress: Progress = tell_nobody,
 ) -> list[Written]:
     """Read one file and write it in another format, whole or not at all.
 
@@ -79,7 +80,7 @@ def convert(
     context
         Size of the image, times of frames, names of classes, mount of the camera.
     progress
-        Of a bag that becomes several files: told the share of them that is written.
+        Told the share of a bag or a folder that is read; of other files that is not known.
     """
     source, out = Path(source), Path(out)
     if out.exists() and source.exists() and out.samefile(source):
@@ -89,7 +90,7 @@ def convert(
     if kind is not None:
         target = _target(out, to, kind)
         topic = _topics_by_kind(source, topics).get(kind) if topics else None
-        return _convert(source, out, kind, format, target, topic, context)
+        return _convert(source, out, kind, format, target, topic, context, progress)
     named = _topics_by_kind(source, topics)
     there = set(bag_topics(source).values())
     kinds = [kind for kind, (message, *_) in FROM_BAG.items() if message in there]
@@ -98,13 +99,21 @@ def convert(
         raise FileError(source, f"has no topic of {known}")
     written: list[Written] = []
     with whole_folder(out) as folder:
-        for done, kind in enumerate(kinds, start=1):
+        for done, kind in enumerate(kinds):
             _, name, target_name = FROM_BAG[kind]
             target = choose_format(out, target_name, FORMATS[kind], kind)
-            more = _convert(source, folder / name, kind, BAG, target, named.get(kind), context)
+            share = partial(_tell_part, progress, done, len(kinds))
+            more = _convert(
+                source, folder / name, kind, BAG, target, named.get(kind), context, share
+            )
             written += [Written(out / one.path.name, one.what, one.loses) for one in more]
-            progress(done / len(kinds))
+            share(1.0)
     return written
+
+
+def _tell_part(progress: Progress, done: int, parts: int, share: float) -> None:
+    """Tell the share of all parts from that of one, of which some are done."""
+    progress((done + share) / parts)
 
 
 def _kind(source: Path, format_name: str | None, to: str | None) -> str | None:
@@ -161,6 +170,7 @@ def _convert(
     target: Format[Any],
     topic: str | None,
     context: ConvertContext,
+    progress: Progress,
 ) -> list[Written]:
     if kind == "camera":
         camera = read_camera(source, format_name, topic=topic)
@@ -178,6 +188,7 @@ def _convert(
             frames=frames,
             body_from_camera=context.body_from_camera,
             topic=topic,
+            progress=progress,
         )
         return _write_trajectory(out, trajectory, target, times=not timeless)
     width, height = context.size or (None, None)
@@ -190,6 +201,7 @@ def _convert(
         classes=context.classes,
         cut=False,
         topic=topic,
+        progress=progress,
     )
     return _write_detections(out, table, target, context, times=not timeless)
 

@@ -11,6 +11,12 @@ from typing import Generic, TypeVar
 from dqslam.io.files import FileError, read_rows
 
 Content = TypeVar("Content")
+Progress = Callable[[float], None]
+"""What is told the share of a file, 0 to 1, that is read."""
+
+
+def tell_nobody(share: float) -> None:
+    """Take the share, and do nothing with it."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +45,7 @@ class Format(Generic[Content]):
     has_times: Callable[[Path], bool] = lambda _: True  #: tells whether a file has them
     endings: tuple[str, ...] = ()  #: of files that are written in it unless told otherwise
     loses: tuple[str, ...] = ()  #: what it has no place for
+    tells_share: bool = False  #: whether `read` has a `progress`, a `Progress`
 
 
 def choose_format(

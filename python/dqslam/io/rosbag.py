@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from dqslam.io.files import FileError
-from dqslam.io.formats import Look
+from dqslam.io.formats import Look, Progress, tell_nobody
 
 NAME = "rosbag"
 LOOKS = "a .bag, .mcap or .db3 file, or a folder with metadata.yaml"
@@ -44,8 +44,12 @@ def looks_like_bag(look: Look) -> bool:
     return look.suffix in ENDINGS or (look.path / "metadata.yaml").is_file()
 
 
-def messages(path: str | Path, kind: str, topic: str | None) -> Iterator[tuple[str, Any]]:
+def messages(
+    path: str | Path, kind: str, topic: str | None, progress: Progress = tell_nobody
+) -> Iterator[tuple[str, Any]]:
     """Give the messages of one kind (``nav_msgs/msg/Odometry``) and where each stands, in order.
+
+    `progress` is told the share of them that was given.
 
     Raises
     ------
@@ -57,8 +61,10 @@ def messages(path: str | Path, kind: str, topic: str | None) -> Iterator[tuple[s
     with _opened(path) as bag:
         name = _topic(path, _topics(bag), kind, topic)
         connections = [connection for connection in bag.connections if connection.topic == name]
+        count = sum(connection.msgcount for connection in connections)
         for number, (connection, _, data) in enumerate(bag.messages(connections), start=1):
             yield f"{name}, message {number}", bag.deserialize(data, connection.msgtype)
+            progress(number / count)
 
 
 def bag_topics(path: str | Path) -> dict[str, str]:

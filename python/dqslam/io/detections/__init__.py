@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from dqslam.io.detections.coco import COCO, read_categories
 from dqslam.io.detections.csv import CSV
@@ -11,7 +12,7 @@ from dqslam.io.detections.rosbag import ARRAYS
 from dqslam.io.detections.table import DetectionTable, checked
 from dqslam.io.detections.yolo import YOLO, read_data_names
 from dqslam.io.files import read_text
-from dqslam.io.formats import choose_format
+from dqslam.io.formats import Progress, choose_format, tell_nobody
 from dqslam.io.frames import FrameTimes
 from dqslam.io.rosbag import topic_option
 
@@ -31,6 +32,7 @@ def read_detections(
     cut: bool = True,
     check: bool = True,
     topic: str | None = None,
+    progress: Progress = tell_nobody,
 ) -> DetectionTable:
     """Read boxes.
 
@@ -54,9 +56,13 @@ def read_detections(
         Without, all is as the file has it, for those who look for mistakes.
     topic
         Of a bag with several.
+    progress
+        Told the share that is read, of a bag or a folder.
     """
     chosen = choose_format(path, format, DETECTION_FORMATS, "detections")
-    options = topic_option(chosen.name, topic)
+    options: dict[str, Any] = dict(topic_option(chosen.name, topic))
+    if chosen.tells_share:
+        options["progress"] = progress
     table = chosen.read(path, width=width, height=height, frames=frames, classes=classes, **options)
     if not check:
         return table

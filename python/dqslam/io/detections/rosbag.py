@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from dqslam.io.detections.table import NO_TRACK, DetectionTable
 from dqslam.io.files import FileError
-from dqslam.io.formats import Format
+from dqslam.io.formats import Format, Progress, tell_nobody
 from dqslam.io.frames import FrameTimes
 from dqslam.io.rosbag import LOOKS, NAME, looks_like_bag, messages, stamp_seconds
 
@@ -33,10 +33,11 @@ def read_detection_arrays(
     frames: FrameTimes | None = None,
     classes: dict[int, str] | None = None,
     topic: str | None = None,
+    progress: Progress = tell_nobody,
 ) -> DetectionTable:
     """Read boxes, unchecked; names of ``classes`` go before the bag's."""
     frame, line, times, boxes, scores, labels, tracks = [], [], [], [], [], [], []
-    for number, (where, message) in enumerate(messages(path, KIND, topic)):
+    for number, (where, message) in enumerate(messages(path, KIND, topic, progress)):
         for detection in message.detections:
             if not len(detection.results):
                 raise FileError(path, f"{where}: a detection without a class")
@@ -95,4 +96,4 @@ def _numbered(labels: list[str], order: list[str]) -> NDArray[np.int64]:
     return np.array([number.get(label, NO_TRACK) for label in labels], dtype=np.int64)
 
 
-ARRAYS = Format(NAME, LOOKS, looks_like_bag, read_detection_arrays)
+ARRAYS = Format(NAME, LOOKS, looks_like_bag, read_detection_arrays, tells_share=True)

@@ -23,7 +23,7 @@ from dqslam.io.files import (
     whole_folder,
     write_text,
 )
-from dqslam.io.formats import Format, Look
+from dqslam.io.formats import Format, Look, Progress, tell_nobody
 from dqslam.io.frames import FrameTimes, frame_of, frame_table, read_frame_times
 from dqslam.io.yaml import parse_yaml
 
@@ -40,6 +40,7 @@ def read_yolo(
     height: int | None = None,
     frames: FrameTimes | None = None,
     classes: dict[int, str] | None = None,
+    progress: Progress = tell_nobody,
 ) -> DetectionTable:
     """Read boxes, unchecked, in images of width x height px."""
     if width is None or height is None:
@@ -52,7 +53,7 @@ def read_yolo(
     if frames is None:
         message = "yolo has no times: say them with --frame-times FILE or --frame-rate HZ"
         raise FileError(path, message)
-    rows, lines, files, frame = _read_rows(folder, frames)
+    rows, lines, files, frame = _read_rows(folder, frames, progress)
     columns = dict(zip(FIELDS, zip(*rows, strict=True), strict=True))
 
     def numbers(name: str) -> list[float]:
@@ -118,12 +119,14 @@ def write_yolo(
 
 
 def _read_rows(
-    folder: Path, frames: FrameTimes
+    folder: Path, frames: FrameTimes, progress: Progress
 ) -> tuple[list[list[str]], list[int], list[Path], list[int]]:
     """Read all boxes as seven cells, with the line, the file and the frame of each."""
     rows: list[list[str]] = []
     lines, files, numbers = [], [], []
-    for file in _box_files(folder):
+    box_files = _box_files(folder)
+    for done, file in enumerate(box_files, start=1):
+        progress(done / len(box_files))
         if not file.stat().st_size:
             continue  # an image without boxes
         number = frame_of(file.name, frames)
@@ -178,4 +181,5 @@ YOLO = Format(
     needs_times=False,
     has_times=lambda path: (path / TIMES).is_file(),
     endings=("",),
+    tells_share=True,
 )

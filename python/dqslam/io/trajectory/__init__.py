@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from dqslam import _core
-from dqslam.io.formats import choose_format
+from dqslam.io.formats import Progress, choose_format, tell_nobody
 from dqslam.io.frames import FrameTimes
 from dqslam.io.rosbag import topic_option
 from dqslam.io.trajectory.euroc import EUROC
@@ -31,6 +32,7 @@ def read_trajectory(
     body_from_camera: ArrayLike | None = None,
     repeated_times: bool = False,
     topic: str | None = None,
+    progress: Progress = tell_nobody,
 ) -> Trajectory:
     """Read a trajectory.
 
@@ -49,9 +51,13 @@ def read_trajectory(
         rounded to its last digit, has a few.
     topic
         Of a bag with several.
+    progress
+        Told the share that is read, of a bag or a folder.
     """
     chosen = choose_format(path, format, TRAJECTORY_FORMATS, "trajectory")
-    options = topic_option(chosen.name, topic)
+    options: dict[str, Any] = dict(topic_option(chosen.name, topic))
+    if chosen.tells_share:
+        options["progress"] = progress
     trajectory = chosen.read(path, frames=frames, repeated_times=repeated_times, **options)
     if body_from_camera is None:
         return trajectory

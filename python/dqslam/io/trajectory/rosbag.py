@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from dqslam.io.files import FileError
-from dqslam.io.formats import Format
+from dqslam.io.formats import Format, Progress, tell_nobody
 from dqslam.io.frames import FrameTimes
 from dqslam.io.rosbag import LOOKS, NAME, looks_like_bag, messages, stamp_seconds
 from dqslam.io.trajectory.table import Trajectory, make_trajectory
@@ -26,10 +26,11 @@ def read_odometry(
     frames: FrameTimes | None = None,
     repeated_times: bool = False,
     topic: str | None = None,
+    progress: Progress = tell_nobody,
 ) -> Trajectory:
     """Read the odometry of a bag; it has times of its own, ``frames`` are not asked."""
     times, rows = [], []
-    for where, message in messages(path, KIND, topic):
+    for where, message in messages(path, KIND, topic, progress):
         p, q = message.pose.pose.position, message.pose.pose.orientation
         row = [p.x, p.y, p.z, q.x, q.y, q.z, q.w]
         if not np.isfinite(row).all():
@@ -48,4 +49,4 @@ def read_odometry(
     )
 
 
-ODOMETRY = Format(NAME, LOOKS, looks_like_bag, read_odometry)
+ODOMETRY = Format(NAME, LOOKS, looks_like_bag, read_odometry, tells_share=True)
