@@ -75,6 +75,9 @@ def test_the_time_left_is_shown_once_a_share_is_told(capsys, monkeypatch):
     assert "reading" in untold
     assert "0:00:00" in untold  # since when
     assert "%" not in untold
+    assert "left" not in untold
     with Output().steps("reading", 4) as done:
         done()
-    assert "25%" in capsys.readouterr().err
+    told = capsys.readouterr().err
+    assert "25%" in told
+    assert "left" in told

@@ -105,10 +105,10 @@ class Output:
             TaskProgressColumn(),
             TimeElapsedColumn(),
             TimeRemainingColumn(),
-            "left",
+            "{task.fields[left]}",
         )
         with self._bar(columns, None) as update:
-            yield lambda done: update(done, total=1.0)
+            yield lambda done: update(done, total=1.0, left="left")
 
     @contextmanager
     def steps(self, what: str, total: int) -> Iterator[Callable[[], None]]:
@@ -145,5 +145,5 @@ class Output:
         console = Console(stderr=True)
         shown = self._shows_progress and console.is_terminal
         with Progress(*columns, console=console, disable=not shown, transient=True) as bar:
-            task = bar.add_task("", total=total)
+            task = bar.add_task("", total=total, left="")
             yield lambda done, **changes: bar.update(task, completed=done, **changes)
