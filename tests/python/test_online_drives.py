@@ -39,7 +39,8 @@ DRIVES = {
     "a third of the noise around a circle": [
         lambda seed=seed: circle(seed, 0.3) for seed in range(4)
     ],
-    "around a circle": [lambda seed=seed: circle(seed, 1.0) for seed in range(6)],
+    # The last two are the hardest of forty.
+    "around a circle": [lambda seed=seed: circle(seed, 1.0) for seed in (0, 1, 2, 3, 8, 27)],
     "the paper's": [lambda seed=seed: steps(paper(seed, 1.0)) for seed in range(6)],
     "through three areas": [lambda seed=seed: steps(chain(3, 11, seed, 1.0)) for seed in range(3)],
 }

@@ -21,11 +21,12 @@ struct Sight {
   bool Waits() const { return object < 0; }
 };
 
-/// A Gaussian in the chart: cost g.d + d.H d / 2 at a distance d from `origin`.
+/// A Gaussian in the chart: cost + g.d + d.H d / 2 at a distance d from `origin`.
 struct Quadratic {
   Vector9d origin = Vector9d::Zero();
   Matrix9d H = Matrix9d::Zero();
   Vector9d g = Vector9d::Zero();
+  double cost = 0;  ///< at the origin
 };
 
 struct Object {

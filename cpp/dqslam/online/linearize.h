@@ -76,7 +76,7 @@ double CostOfPriors(const Model& model, const Object& object, const Vector9d& ch
 /// Cost of a quadratic at a chart; its gradient there.
 inline double CostOf(const Quadratic& quadratic, const Vector9d& chart) {
   const Vector9d d = chart - quadratic.origin;
-  return quadratic.g.dot(d) + 0.5 * d.dot(quadratic.H * d);
+  return quadratic.cost + quadratic.g.dot(d) + 0.5 * d.dot(quadratic.H * d);
 }
 inline Vector9d GradientOf(const Quadratic& quadratic, const Vector9d& chart) {
   return quadratic.g + quadratic.H * (chart - quadratic.origin);

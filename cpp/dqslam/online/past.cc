@@ -31,7 +31,9 @@ void AddPast(const Model& model,
     Linearize<Pose>(model, station, sight, object.chart, Edges::kBox, &linear);
     const Matrix9d H = linear.by_object.transpose() * linear.by_object;
     past->H += H;
-    past->g += linear.by_object.transpose() * linear.residual - H * d;
+    const Vector9d g = linear.by_object.transpose() * linear.residual;
+    past->g += g - H * d;
+    past->cost += linear.cost - g.dot(d) + 0.5 * d.dot(H * d);
   }
 }
 

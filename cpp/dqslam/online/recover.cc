@@ -2,19 +2,14 @@
 
 #include <algorithm>
 
+#include "dqslam/online/restart.h"
 #include "dqslam/online/start.h"
 
 namespace dqslam::online {
 namespace {
 
 constexpr int kIterations = 10;
-constexpr double kFirstDamping = 1e-4;
-// What a sight costs beside its tangent residual while its object is not in front.
-constexpr double kUndefinedCost = 50;
-
-double Cost(const Work& work) {
-  return work.cost + kUndefinedCost * work.undefined;
-}
+constexpr double kFirstDamping = 1e-8;
 
 // Objects of no map that were seen first from `begin` on.
 template <typename Pose>
@@ -43,18 +38,11 @@ int Recover(const Model& model,
   double damping = kFirstDamping;
   const Work first =
       region->Minimize(history, begin, Past::kAnew, options.smoothing_iterations, &damping);
-  double best = Cost(first);
+  double best = CostOf(first);
   int linearized = first.linearized;
   for (const bool by_size : {false, true}) {
-    const std::vector<typename History<Pose>::Storage> poses(history->poses.begin() + begin,
-                                                             history->poses.end());
-    std::vector<Vector9d> charts;
-    for (const Object& object : history->objects) charts.push_back(object.chart);
-    for (int pose = std::max(begin, 1); pose < history->num_poses(); ++pose) {
-      Pose::Compose(history->poses[pose - 1].data(),
-                    history->steps[pose].relative.data(),
-                    history->poses[pose].data());
-    }
+    const Checkpoint<Pose> checkpoint(*history, begin);
+    BackToOdometry(begin, history);
     for (const int row : young) {
       Object& object = history->objects[row];
       object.chart = StartAgain(model, *history, object, by_size);
@@ -64,12 +52,11 @@ int Recover(const Model& model,
         region->Minimize(history, begin, Past::kAnew, kIterations, &damping, Edges::kTangent);
     const Work work = region->Minimize(history, begin, Past::kAnew, kIterations, &damping);
     linearized += towards.linearized + work.linearized;
-    if (Cost(work) < best) {
-      best = Cost(work);
-      continue;
+    if (CostOf(work) < best) {
+      best = CostOf(work);
+    } else {
+      checkpoint.Restore(history);
     }
-    std::copy(poses.begin(), poses.end(), history->poses.begin() + begin);
-    for (size_t row = 0; row < charts.size(); ++row) history->objects[row].chart = charts[row];
   }
   return linearized;
 }

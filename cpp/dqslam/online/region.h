@@ -21,6 +21,12 @@ struct Work {
   std::vector<int> misfits;  ///< objects that their sights in the region do not fit
 };
 
+/// A place where a sight is impossible is worth little, however well its tangents fit there.
+inline double CostOf(const Work& work) {
+  constexpr double kUndefinedCost = 50;
+  return work.cost + kUndefinedCost * work.undefined;
+}
+
 template <typename Pose>
 class Region {
  public:

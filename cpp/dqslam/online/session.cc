@@ -6,6 +6,7 @@
 
 #include "dqslam/dispatch.h"
 #include "dqslam/online/checks.h"
+#include "dqslam/online/close_loop.h"
 #include "dqslam/online/merge.h"
 #include "dqslam/online/recover.h"
 #include "dqslam/online/region.h"
@@ -241,11 +242,15 @@ class SessionOf : public Session {
 
   // Objects in a wrong place are started again, and all is minimised once more.
   void SmoothRegion(const Smoothing& smoothing, StepReport* report) {
+    const int from = std::max(smoothing.begin, FirstFree());
+    const int window_begin = num_poses() - report->window_poses;
     double damping = kFirstDamping;
     for (int round = 0; round < smoothing.rounds; ++round) {
       const Work work =
-          region_.Minimize(&history_, smoothing.begin, Past::kAnew, smoothing.iterations, &damping);
-      MarkStale(smoothing.begin, &history_);
+          round == 0 && smoothing.closes_loop
+              ? CloseLoop(model_, from, window_begin, options_, &region_, &history_)
+              : region_.Minimize(&history_, from, Past::kAnew, smoothing.iterations, &damping);
+      MarkStale(from, &history_);
       schedule_.SmoothedWith(work.poses, work.front);
       report->smoothed_poses = work.poses;
       report->smoothed_sights += work.linearized;

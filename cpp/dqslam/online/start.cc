@@ -134,10 +134,19 @@ void TryAgain(const Model& model, const History<Pose>& history, Object* object) 
   object->chart = here;
 }
 
+template <typename Pose>
+Matrix9d InformationAt(const Model& model, const History<Pose>& history, const Object& object) {
+  Quadratic sum;
+  std::vector<double> unused;
+  LinearizeAt(model, history, object, object.chart, &sum, &unused);
+  return sum.H;
+}
+
 #define DQSLAM_INSTANTIATE(Pose)                                                                   \
   template double Settle<Pose>(const Model&, const History<Pose>&, const Object&, int, Vector9d*); \
   template Vector9d Birth<Pose>(const Model&, const History<Pose>&, const Object&);                \
   template Vector9d StartAgain<Pose>(const Model&, const History<Pose>&, const Object&, bool);     \
+  template Matrix9d InformationAt<Pose>(const Model&, const History<Pose>&, const Object&);        \
   template void TryAgain<Pose>(const Model&, const History<Pose>&, Object*)
 DQSLAM_INSTANTIATE(Se2);
 DQSLAM_INSTANTIATE(Se3);

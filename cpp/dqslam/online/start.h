@@ -28,4 +28,8 @@ Vector9d StartAgain(const Model& model,
 template <typename Pose>
 void TryAgain(const Model& model, const History<Pose>& history, Object* object);
 
+/// Information about an object where it is, the poses of its sights held fixed.
+template <typename Pose>
+Matrix9d InformationAt(const Model& model, const History<Pose>& history, const Object& object);
+
 }  // namespace dqslam::online
