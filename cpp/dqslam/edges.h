@@ -72,6 +72,17 @@ inline bool DifferentiateTangents(const Surface<double>& in_camera,
   return true;
 }
 
+/// IgnoreBeyond with derivatives.
+inline void IgnoreBeyond(const EdgeFlags& one_sided,
+                         const double (&outward)[kBoxSize],
+                         Eigen::Vector4d* error,
+                         EdgeDerivatives* edges) {
+  for (int edge = 0; edge < kBoxSize; ++edge) {
+    if (!IsBeyond(one_sided[edge], outward[edge], (*error)[edge])) continue;
+    (*error)[edge] = edges->by_center[edge] = edges->by_shape[edge] = 0;
+  }
+}
+
 /// A pose of the robot and its camera, as the derivatives need them.
 struct Station {
   template <typename Pose>

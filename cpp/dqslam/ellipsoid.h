@@ -144,13 +144,24 @@ EdgeFlags OneSidedEdges(const EdgeFlags& truncated,
                         const Surface<double>& in_camera,
                         const Eigen::Vector4d& predicted);
 
+/// Signs that turn errors outwards, edge by edge: of predicted - observed boxes, and of the
+/// distances of TangentDistances.
+inline constexpr double kBoxOutward[] = {-1, -1, 1, 1}, kTangentOutward[] = {1, 1, 1, 1};
+
 /// An edge that the image border cut says only that the object goes on beyond: its error counts
-/// where the prediction ends inside, and is zero otherwise.  Errors are predicted - observed.
+/// where the prediction ends inside.
 template <typename T>
-void IgnoreBeyond(const EdgeFlags& one_sided, Vector4<T>* box_error) {
+bool IsBeyond(bool one_sided, double outward, const T& error) {
+  return one_sided && T(outward) * error > T(0);
+}
+
+/// Makes the errors zero that do not count.
+template <typename T>
+void IgnoreBeyond(const EdgeFlags& one_sided,
+                  Vector4<T>* error,
+                  const double (&outward)[kBoxSize] = kBoxOutward) {
   for (int edge = 0; edge < kBoxSize; ++edge) {
-    const double outward = edge < 2 ? -1 : 1;
-    if (one_sided[edge] && T(outward) * (*box_error)[edge] > T(0)) (*box_error)[edge] = T(0);
+    if (IsBeyond(one_sided[edge], outward[edge], (*error)[edge])) (*error)[edge] = T(0);
   }
 }
 

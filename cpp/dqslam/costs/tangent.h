@@ -33,9 +33,7 @@ struct TangentCost
         ToCamera(LocateCamera<Pose>(pose, mount), Landmark::Unpack(landmark));
     Vector4<T> error;
     if (!TangentDistances(surface, camera, observed, depth, &error)) return false;
-    for (int edge = 0; edge < kBoxSize; ++edge) {
-      if (one_sided[edge] && error[edge] > T(0)) error[edge] = T(0);
-    }
+    IgnoreBeyond(one_sided, &error, kTangentOutward);
     Whiten(sqrt_information, error, residual);
     return true;
   }
