@@ -5,17 +5,10 @@
 #include <Eigen/Core>
 #include <memory>
 
-#include "dqslam/block_matrix.h"
+#include "dqslam/normal_equations.h"
 #include "dqslam/optimize.h"
 
 namespace dqslam {
-
-/// H step = -gradient is the Gauss-Newton step.
-struct NormalEquations {
-  double cost = 0;           ///< half the sum of the squared residuals, after the loss
-  Eigen::VectorXd gradient;  ///< J^T r
-  BlockMatrix H;             ///< J^T J
-};
 
 class LeastSquares {
  public:
@@ -29,6 +22,10 @@ class LeastSquares {
   virtual bool Plus(const Eigen::VectorXd& values,
                     const Eigen::VectorXd& step,
                     Eigen::VectorXd* moved) const = 0;
+  /// The same to first order, but along the path (path_step.h); false where that is impossible.
+  virtual bool PlusAlongPath(const Eigen::VectorXd& values,
+                             const Eigen::VectorXd& step,
+                             Eigen::VectorXd* moved) const = 0;
   /// Returns false where a residual is undefined.
   virtual bool Cost(const Eigen::VectorXd& values, double* cost) const = 0;
   /// Likewise; sets equations().

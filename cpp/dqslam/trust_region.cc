@@ -1,29 +1,21 @@
 #include "dqslam/trust_region.h"
 
-#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <limits>
 #include <sstream>
 
-#include "dqslam/block_cholesky.h"
+#include "dqslam/strategy.h"
 
 namespace dqslam {
 namespace {
 
 using Eigen::VectorXd;
 
-// The constants are those of Ceres, but for two.  Its trust region grows threefold at most.  And it
-// damps dog-leg's Gauss-Newton step by 1e-8 of the curvature, which then creeps along the weakest
-// modes of a trajectory of 50 000 poses.
-constexpr double kSmallestScale = 1e-6, kLargestScale = 1e32;
-constexpr double kSmallestRadius = 1e-32, kLargestRadius = 1e16;
-constexpr double kDampedRadius = 1e4;         // where Levenberg-Marquardt starts
-constexpr double kFastestGrowth = 10;         // of the radius, in one step
+constexpr double kSmallestRadius = 1e-32;
 constexpr double kSufficientDecrease = 1e-3;  // of the decrease that the model predicts
 constexpr double kTinyStep = 1e-12;           // relative to the values
 constexpr double kTinyGradient = 1e-12;
-constexpr double kLeastDamping = 1e-14, kMostDamping = 1;
 // An invalid step is a step into impossible geometry: shrink and go on.
 constexpr int kMaxInvalidSteps = 50;
 
@@ -40,137 +32,40 @@ class Stopwatch {
   std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
 };
 
-// How far to go, and where.
-class Strategy {
+// Where a step leads.
+class Trial {
  public:
-  Strategy(const BlockMatrix& H, double radius) : radius_(radius), cholesky_(H) {}
-  virtual ~Strategy() = default;
-  // The step for equations that have not changed since the last call unless is_new; false where
-  // there is none.
-  virtual bool Step(const NormalEquations& equations, bool is_new, VectorXd* step) = 0;
-  virtual void Accept(double gain_ratio) = 0;
-  virtual void Reject() = 0;
-  virtual void RejectInvalid() = 0;
-  // Whether the trust region cut the step: then a small change of cost says nothing.
-  virtual bool IsLimited() const { return false; }
-  double radius() const { return radius_; }
+  explicit Trial(const LeastSquares& problem) : problem_(problem) {}
 
- protected:
-  // Squared scale of each variable: the curvature, within limits that are relative to the first.
-  VectorXd Curvature(const NormalEquations& equations) {
-    const VectorXd diagonal = equations.H.diagonal();
-    if (first_scale_.size() == 0) {
-      first_scale_ = (1 + diagonal.array().sqrt()).inverse().square();
-    }
-    return (diagonal.array() * first_scale_.array())
-        .max(kSmallestScale)
-        .min(kLargestScale)
-        .matrix()
-        .cwiseQuotient(first_scale_);
-  }
-
-  bool Solve(const NormalEquations& equations, const VectorXd& damping, VectorXd* step) {
-    if (!cholesky_.Factorize(equations.H, damping)) return false;
-    *step = cholesky_.Solve(-equations.gradient);
-    return step->allFinite();
-  }
-
-  double radius_;
-
- private:
-  BlockCholesky cholesky_;
-  VectorXd first_scale_;
-};
-
-class LevenbergMarquardt : public Strategy {
- public:
-  using Strategy::Strategy;
-
-  bool Step(const NormalEquations& equations, bool is_new, VectorXd* step) override {
-    if (is_new) curvature_ = Curvature(equations);
-    return Solve(equations, curvature_ / radius_, step);
-  }
-  void Accept(double gain_ratio) override {
-    const double growth = 1 - std::pow(2 * gain_ratio - 1, 3);
-    radius_ = std::min(radius_ / std::max(1 / kFastestGrowth, growth), kLargestRadius);
-    shrinkage_ = 2;
-  }
-  void Reject() override {
-    radius_ /= shrinkage_;
-    shrinkage_ *= 2;
-  }
-  void RejectInvalid() override { Reject(); }
-
- private:
-  VectorXd curvature_;
-  double shrinkage_ = 2;
-};
-
-// Powell's: where the whole Gauss-Newton step fails, shorter ones cost no further factorisation.
-class Dogleg : public Strategy {
- public:
-  using Strategy::Strategy;
-
-  bool Step(const NormalEquations& equations, bool is_new, VectorXd* step) override {
-    if (is_new || stale_) {
-      scale_ = Curvature(equations).cwiseSqrt();
-      gradient_ = equations.gradient.cwiseQuotient(scale_);
-      const VectorXd uphill = gradient_.cwiseQuotient(scale_);
-      cauchy_ = gradient_.squaredNorm() / uphill.dot(equations.H.Multiply(uphill));
-      if (!FindGaussNewton(equations)) return false;
-      stale_ = false;
-    }
-    *step = Within().cwiseQuotient(scale_);
-    return true;
-  }
-  void Accept(double gain_ratio) override {
-    if (gain_ratio < 0.25) radius_ *= 0.5;
-    if (gain_ratio > 0.75) radius_ = std::max(radius_, 3 * step_norm_);
-    damping_ = std::max(kLeastDamping, 0.2 * damping_);
-  }
-  bool IsLimited() const override { return gauss_newton_.norm() > radius_; }
-  void Reject() override { radius_ = 0.5 * step_norm_; }
-  void RejectInvalid() override {
-    damping_ *= 10;
-    stale_ = true;
-  }
-
- private:
-  bool FindGaussNewton(const NormalEquations& equations) {
-    for (; damping_ < kMostDamping; damping_ *= 10) {
-      if (Solve(equations, damping_ * scale_.cwiseAbs2(), &gauss_newton_)) {
-        gauss_newton_.array() *= scale_.array();
-        return true;
+  // Goes straight, or along the path where straight wins little of the decrease that the model
+  // predicts, and less. Returns the decrease: minus infinity where a residual is undefined.
+  double Take(const VectorXd& values, const VectorXd& step, double predicted) {
+    const double before = problem_.equations().cost;
+    cost_ = CostOf(problem_.Plus(values, step, &reached_), reached_);
+    if (!(before - cost_ > kPoorGain * predicted)) {
+      const double along_path =
+          CostOf(problem_.PlusAlongPath(values, step, &along_path_), along_path_);
+      if (along_path < cost_) {
+        cost_ = along_path;
+        reached_.swap(along_path_);
       }
     }
-    return false;
+    return before - cost_;
+  }
+  double cost() const { return cost_; }
+  VectorXd& reached() { return reached_; }
+
+ private:
+  double CostOf(bool possible, const VectorXd& values) const {
+    double cost = 0;
+    return possible && problem_.Cost(values, &cost) ? cost
+                                                    : std::numeric_limits<double>::infinity();
   }
 
-  // The point of the dog-leg path at the radius, scaled.
-  VectorXd Within() {
-    if (gauss_newton_.norm() <= radius_) {
-      step_norm_ = gauss_newton_.norm();
-      return gauss_newton_;
-    }
-    step_norm_ = radius_;
-    const VectorXd downhill = -cauchy_ * gradient_;
-    if (downhill.norm() >= radius_) return downhill * (radius_ / downhill.norm());
-    const VectorXd leg = gauss_newton_ - downhill;
-    const double a = leg.squaredNorm(), b = downhill.dot(leg);
-    const double c = radius_ * radius_ - downhill.squaredNorm();
-    const double root = std::sqrt(b * b + a * c);
-    return downhill + (b <= 0 ? (root - b) / a : c / (b + root)) * leg;
-  }
-
-  VectorXd scale_, gradient_, gauss_newton_;
-  double cauchy_ = 0, damping_ = kLeastDamping, step_norm_ = 0;
-  bool stale_ = false;
+  const LeastSquares& problem_;
+  VectorXd reached_, along_path_;
+  double cost_ = 0;
 };
-
-std::unique_ptr<Strategy> MakeStrategy(Minimizer minimizer, const BlockMatrix& H) {
-  if (minimizer == Minimizer::kDogleg) return std::make_unique<Dogleg>(H, kLargestRadius);
-  return std::make_unique<LevenbergMarquardt>(H, kDampedRadius);
-}
 
 std::string Message(const char* what, double value, const char* relation, double limit) {
   std::ostringstream message;
@@ -218,7 +113,8 @@ Summary Minimize(const TrustRegionOptions& options,
     const Stopwatch linear_solver(&summary.linear_solver_seconds);
     strategy = MakeStrategy(options.minimizer, equations.H);
   }
-  VectorXd step, candidate;
+  VectorXd step;
+  Trial trial(problem);
   bool is_new = true;
   int invalid_steps = 0;
   while (!summary.converged) {
@@ -254,10 +150,7 @@ Summary Minimize(const TrustRegionOptions& options,
     }
 
     const Stopwatch evaluation(&summary.evaluation_seconds);
-    double cost = 0;
-    const bool possible = problem.Plus(*values, step, &candidate) && problem.Cost(candidate, &cost);
-    const double decrease =
-        possible ? equations.cost - cost : -std::numeric_limits<double>::infinity();
+    const double decrease = trial.Take(*values, step, predicted);
     if (!strategy->IsLimited() &&
         std::abs(decrease) <= options.function_tolerance * equations.cost) {
       converge(Message(
@@ -269,8 +162,8 @@ Summary Minimize(const TrustRegionOptions& options,
       continue;
     }
     strategy->Accept(decrease / predicted);
-    values->swap(candidate);
-    summary.final_cost = cost;
+    values->swap(trial.reached());
+    summary.final_cost = trial.cost();
     if (summary.converged) break;  // the derivatives there are not needed
     problem.Linearize(*values);
     is_new = true;

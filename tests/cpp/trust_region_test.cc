@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "dqslam/recover.h"
@@ -22,6 +23,11 @@ class Rosenbrock : public LeastSquares {
             Eigen::VectorXd* moved) const override {
     *moved = values + step;
     return true;
+  }
+  bool PlusAlongPath(const Eigen::VectorXd&,
+                     const Eigen::VectorXd&,
+                     Eigen::VectorXd*) const override {
+    return false;
   }
   bool Cost(const Eigen::VectorXd& v, double* cost) const override {
     *cost = 50 * std::pow(v[1] - v[0] * v[0], 2) + 0.5 * std::pow(1 - v[0], 2);
@@ -103,9 +109,62 @@ TEST_P(TrustRegion, GivesTheSameBitsEachTime) {
   EXPECT_EQ(results[0], results[1]);
 }
 
+/// Poses from the second one on, with all objects, turned by half a radian about the second one.
+template <typename Pose>
+State Hinged(const State& truth) {
+  const Eigen::Matrix3d R = Eigen::AngleAxisd(0.5, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  State state = truth;
+  Eigen::Vector3d hinge(truth.poses(1, 0), truth.poses(1, 1), 0);
+  for (Eigen::Index row = 1; row < truth.poses.rows(); ++row) {
+    auto pose = state.poses.row(row);
+    Eigen::Vector3d position = Eigen::Vector3d::Zero();
+    position.head<2>() = pose.template head<2>().transpose();
+    pose.template head<2>() = (hinge + R * (position - hinge)).template head<2>().transpose();
+    if constexpr (Pose::kModel == PoseModel::kSe2) {
+      pose[2] += 0.5;
+    } else {
+      const Eigen::Quaterniond q(Eigen::Vector4d(pose.template tail<4>().transpose()).data());
+      pose.template tail<4>() = (Eigen::Quaterniond(R) * q).coeffs().transpose();
+    }
+  }
+  for (Eigen::Index row = 0; row < truth.landmarks.rows(); ++row) {
+    Surface<double> surface = EllipsoidModel::Unpack(truth.landmarks.row(row).data());
+    surface.center = hinge + R * (surface.center - hinge);
+    surface.shape = R * surface.shape * R.transpose();
+    state.landmarks.row(row) = EllipsoidFromSurface(surface);
+  }
+  return state;
+}
+
+template <typename Pose>
+class HingeOf : public testing::Test {};
+using PoseTypes = testing::Types<Se2, Se3>;
+TYPED_TEST_SUITE(HingeOf, PoseTypes);
+
+// One step of odometry is wrong, by 0.5 rad at a sigma of 0.02, and all that hangs from it. To turn
+// it back along tangents would stretch the path by an eighth.
+TYPED_TEST(HingeOf, TurnsTheWholePathInAStep) {
+  const Scene scene = MakeScene<TypeParam>();
+  const PreparedGraph prepared(scene.graph, false);
+  Stage stage = BatchStage(prepared, {});
+  const auto from_the_first = [&](int row) { return scene.graph.boxes.pose[row] == 0; };
+  stage.boxes.erase(std::remove_if(stage.boxes.begin(), stage.boxes.end(), from_the_first),
+                    stage.boxes.end());
+  State state = Hinged<TypeParam>(scene.truth);
+  const SolveOptions options;
+  const auto problem = MakeLeastSquares(prepared, options, stage, state);
+  Eigen::VectorXd values = problem->Pack(state);
+  const Summary summary = Minimize(OptionsOf(Minimizer::kDogleg), nullptr, problem.get(), &values);
+  problem->Unpack(values, &state);
+  EXPECT_NEAR(summary.initial_cost, 0.5 * 25 * 25, 1e-3);
+  EXPECT_LT(summary.final_cost, 1e-6);
+  EXPECT_EQ(summary.rejected_steps, 0);
+  EXPECT_LE(summary.iterations, 4);
+  EXPECT_LT((state.poses - scene.truth.poses).cwiseAbs().maxCoeff(), 1e-4);
+}
+
 template <typename Pose>
 class BackendsOf : public testing::Test {};
-using PoseTypes = testing::Types<Se2, Se3>;
 TYPED_TEST_SUITE(BackendsOf, PoseTypes);
 
 /// Ceres is the second opinion: both reach one optimum from noisy data.
