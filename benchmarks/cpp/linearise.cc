@@ -123,8 +123,8 @@ void AlgebraicAutoDiff(benchmark::State& state) {
   });
 }
 
-/// The derivatives of edges.h with all that leads to them, whitened; `differentiate(surface, box,
-/// &error, &edges)`.
+/// The derivatives of edges.h with all that leads to them, whitened;
+/// `differentiate(camera, surface, box, &error, &edges)`.
 template <typename Pose, typename Differentiate>
 void LineariseByHand(benchmark::State& state, const Differentiate& differentiate) {
   const Situations<Pose> situations;
@@ -140,6 +140,7 @@ void LineariseByHand(benchmark::State& state, const Differentiate& differentiate
     Eigen::Matrix<double, kBoxSize, Pose::kTangentSize> by_pose;
     Eigen::Matrix<double, kBoxSize, kLandmarkSize> by_landmark;
     ByPoseAndLandmark<Pose>(edges, station, mount, landmark, &by_pose, &by_landmark);
+    error = kWeight * error;
     by_pose = kWeight * by_pose;
     by_landmark = kWeight * by_landmark;
     benchmark::DoNotOptimize(error);
@@ -153,26 +154,17 @@ void LineariseByHand(benchmark::State& state, const Differentiate& differentiate
 template <typename Pose>
 void BoxByHand(benchmark::State& state) {
   LineariseByHand<Pose>(state,
-                        [](const Camera& camera,
-                           const Surface<double>& surface,
-                           const Eigen::Vector4d& box,
-                           Eigen::Vector4d* error,
-                           EdgeDerivatives* edges) {
+                        [](auto& camera, auto& surface, auto& box, auto* error, auto* edges) {
                           DifferentiateBox(surface, camera, error, edges);
-                          *error = kWeight * (*error - box);
+                          *error -= box;
                         });
 }
 
 template <typename Pose>
 void TangentByHand(benchmark::State& state) {
   LineariseByHand<Pose>(state,
-                        [](const Camera& camera,
-                           const Surface<double>& surface,
-                           const Eigen::Vector4d& box,
-                           Eigen::Vector4d* error,
-                           EdgeDerivatives* edges) {
+                        [](auto& camera, auto& surface, auto& box, auto* error, auto* edges) {
                           DifferentiateTangents(surface, camera, box, kDepth, error, edges);
-                          *error = kWeight * *error;
                         });
 }
 

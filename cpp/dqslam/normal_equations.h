@@ -19,7 +19,7 @@ class Accumulator {
  public:
   explicit Accumulator(NormalEquations* equations) : equations_(*equations), H_(equations_.H) {}
 
-  /// What a residual says of one block.
+  /// What a residual says of one block. (Eigen's other product first copies 4 x 9 to be multiplied.)
   template <int kRows, int kColumns>
   void Own(int block,
            const Eigen::Matrix<double, kRows, kColumns>& J,
@@ -27,7 +27,7 @@ class Accumulator {
     if (block < 0) return;
     equations_.gradient.segment<kColumns>(H_.offset(block)).noalias() += J.transpose() * residual;
     Eigen::Map<Eigen::Matrix<double, kColumns, kColumns>>(H_.Diagonal(block)).noalias() +=
-        J.transpose() * J;
+        J.transpose().lazyProduct(J);
   }
 
   /// How it couples two blocks: J_a and J_b in the order of their numbers.

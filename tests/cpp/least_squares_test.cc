@@ -171,6 +171,42 @@ TYPED_TEST(LeastSquaresOf, ValuesComeBackAsTheyWere) {
   EXPECT_EQ(back.landmarks, this->state_.landmarks);
 }
 
+// Poses, objects and switches: what differs falls with the square of the step.
+TYPED_TEST(LeastSquaresOf, AlongThePathIsPlusToFirstOrder) {
+  const PreparedGraph prepared(this->displaced_.scene.graph, false);
+  Stage stage = this->AllOf(Residual::kBox);
+  stage.loss = Loss::kSwitchable;
+  const SolveOptions options;
+  const auto problem = MakeLeastSquares(prepared, options, stage, this->state_);
+  const Eigen::VectorXd values = problem->Pack(this->state_);
+  Random random(8);
+  const Eigen::VectorXd step = Eigen::VectorXd::NullaryExpr(problem->equations().H.rows(),
+                                                            [&] { return random.Uniform(-1, 1); });
+  double differences[2];
+  for (int half = 0; half < 2; ++half) {
+    const double h = half == 0 ? 1e-4 : 5e-5;
+    Eigen::VectorXd straight, along_path;
+    ASSERT_TRUE(problem->Plus(values, h * step, &straight));
+    ASSERT_TRUE(problem->PlusAlongPath(values, h * step, &along_path));
+    EXPECT_GT((straight - values).norm(), 1e-4);
+    differences[half] = (along_path - straight).norm();
+  }
+  EXPECT_LT(differences[0], 1e-4);
+  EXPECT_NEAR(differences[0] / differences[1], 4, 0.1);
+}
+
+TYPED_TEST(LeastSquaresOf, DualQuadricsDoNotGoAlongThePath) {
+  const PreparedGraph prepared(this->displaced_.scene.graph, false);
+  SolveOptions options;
+  options.landmark_model = LandmarkModel::kDualQuadric;
+  const auto problem =
+      MakeLeastSquares(prepared, options, this->AllOf(Residual::kTangent), this->state_);
+  const Eigen::VectorXd values = problem->Pack(this->state_);
+  Eigen::VectorXd moved;
+  const Eigen::VectorXd step = Eigen::VectorXd::Zero(problem->equations().H.rows());
+  EXPECT_FALSE(problem->PlusAlongPath(values, step, &moved));
+}
+
 TYPED_TEST(LeastSquaresOf, AnObjectBehindTheCameraHasNoCost) {
   const PreparedGraph prepared(this->displaced_.scene.graph, false);
   const auto problem = MakeLeastSquares(prepared, {}, this->AllOf(Residual::kBox), this->state_);
