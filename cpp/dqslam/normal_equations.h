@@ -19,7 +19,8 @@ class Accumulator {
  public:
   explicit Accumulator(NormalEquations* equations) : equations_(*equations), H_(equations_.H) {}
 
-  /// What a residual says of one block. (Eigen's other product first copies 4 x 9 to be multiplied.)
+  /// What a residual says of one block. (Eigen's other product first copies 4 x 9 to be
+  /// multiplied.)
   template <int kRows, int kColumns>
   void Own(int block,
            const Eigen::Matrix<double, kRows, kColumns>& J,

@@ -70,8 +70,7 @@ bool EdgeErrors(const Camera& camera,
       if (!TangentDistances(in_camera, camera, sight.value, depth, error)) return false;
     }
     if (!sight.truncated.any()) return true;
-    // Distances point outwards.
-    *error = (sight.truncated && error->array() > 0).select(0, *error);
+    IgnoreBeyond(sight.truncated, error, kTangentOutward);
   }
   if constexpr (kDerivatives) {
     // Ignored.
