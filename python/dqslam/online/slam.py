@@ -119,6 +119,8 @@ class OnlineSlam:
         )
         trust = FINAL if trust_ids == FINAL and finds_movers else min(trust_ids, UNSURE)
         self._identifier = Identifier(assumptions, self._journal, trust=trust)
+        if not self._believes_ids:
+            import scipy.optimize  # noqa: F401, half a second that no step should take
 
     # ------------------------------------------------------------------------------ steps
 
