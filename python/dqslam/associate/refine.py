@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from dqslam import _core
 from dqslam.associate.births import FEWEST_VIEWS
 from dqslam.associate.follow import Follower, choose, predict
 from dqslam.associate.images import group_by_pose
@@ -39,6 +40,38 @@ def refine(follower: Follower, progress: Callable[[float], None]) -> None:
             scene.left_out |= find_scattered(scene)
         progress((done + 1) / ROUNDS)
     settle(scene)
+    if follower.final and scene.mode == _core.Mode.SLAM:
+        try_refused(scene)
+
+
+def try_refused(scene: SceneMap) -> None:
+    """Believe all boxes of final ids in the map once, and judge by what comes of it.
+
+    Along a drifting path a box that is right may be refused. The map then agrees with itself
+    without it, the path bent where it is missing, and round after round refuses it again. Final ids
+    say which object a box shows: all take part once, under a robust loss, those of objects that
+    were left out as well.
+    """
+    refused = np.flatnonzero(scene.box_object < 0)
+    own = [scene.object_of_tracklet.get(int(one), -1) for one in scene.tracklet[refused]]
+    scene.claim(refused, np.array(own, dtype=np.int64))
+    scene.left_out = {}
+    settle(scene)
+    reassign(scene, np.inf)
+    scene.left_out = _find_few(scene)
+    scene.left_out |= find_misfits(scene)
+    scene.left_out |= find_movers(scene)
+    scene.left_out |= find_scattered(scene)
+    settle(scene)
+
+
+def _find_few(scene: SceneMap) -> dict[int, str]:
+    """Return objects that too few boxes are left of."""
+    counts = scene.box_counts
+    return {
+        row: f"one place explains {counts[row]} of its boxes, {FEWEST_VIEWS} are needed"
+        for row in np.flatnonzero((counts > 0) & (counts < FEWEST_VIEWS)).tolist()
+    }
 
 
 def settle(scene: SceneMap) -> None:

@@ -17,7 +17,6 @@ from dqslam.problem import BoxNoise, solve
 from dqslam.recording import Recording
 from dqslam.run_recording.border import with_cut_edges
 from dqslam.run_recording.conclude import Outcome, RunResult, conclude
-from dqslam.run_recording.final_ids import judge_again
 from dqslam.run_recording.hold_out import choose_held_out
 from dqslam.size_prior import SizePrior, SizePriors
 from dqslam.uncertainty import Marginals, marginal_covariances
@@ -97,8 +96,6 @@ def run(
         estimates_noise=estimates_noise,
         progress=progress,
     )
-    if trust_ids == FINAL and mode == _core.Mode.SLAM:
-        found = judge_again(found)
     object_id = np.where(held_out, detections.object_id, -1)
     object_id[~held_out] = found.object_id
     estimate, marginals, summary = _finish(known, found, mode)
