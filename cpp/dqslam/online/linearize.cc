@@ -81,40 +81,51 @@ bool EdgeErrors(const Camera& camera,
   return true;
 }
 
+// Returns the error by edge, and fills all of `linear` that the loss has no part in.
 template <typename Pose>
-void LinearizeBox(const Model& model,
-                  const Station& station,
-                  const Sight& sight,
-                  const Vector9d& chart,
-                  Edges residual,
-                  Vector4d* error,
-                  Linear<Pose>* linear) {
-  const Unpacked<ChartModel> object(chart);
+Vector4d LinearizeBox(const Model& model,
+                      const Station& station,
+                      const Sight& sight,
+                      const Unpacked<ChartModel>& object,
+                      Edges residual,
+                      Linear<Pose>* linear) {
   const Surface<double> in_camera = ToCamera(station.camera, object.surface);
+  Vector4d error;
   EdgeDerivatives edges;
   linear->depth = 0;
   if (residual == Edges::kTangent ||
-      !EdgeErrors<true>(model.camera, sight, in_camera, 0, error, &edges)) {
+      !EdgeErrors<true>(model.camera, sight, in_camera, 0, &error, &edges)) {
     linear->depth = TangentDepth(in_camera);
-    if (!EdgeErrors<true>(model.camera, sight, in_camera, linear->depth, error, &edges)) {
+    if (!EdgeErrors<true>(model.camera, sight, in_camera, linear->depth, &error, &edges)) {
       // A shape that rounding has flattened: CostOfSight() is infinite there.
-      error->setZero();
       linear->by_pose.setZero();
       linear->by_object.setZero();
-      return;
+      return Vector4d::Zero();
     }
   }
   ByPoseAndLandmark<Pose>(
       edges, station, model.mount, object, &linear->by_pose, &linear->by_object);
+  return error;
 }
 
 // r = z - q, q = R^T (c - t).
+Vector4d PositionError(const Station& station, const Sight& sight, const Vector3d& center) {
+  const Rigid<double>& robot = station.world_from_robot;
+  Vector4d error = Vector4d::Zero();
+  error.head<3>() =
+      sight.value.head<3>() - robot.rotation.transpose() * (center - robot.translation);
+  return error;
+}
+
 template <typename Pose>
-void LinearizePosition(const Station& station,
-                       const Surface<double>& object,
-                       Linear<Pose>* linear) {
+Vector4d LinearizePosition(const Station& station,
+                           const Sight& sight,
+                           const Vector3d& center,
+                           Linear<Pose>* linear) {
+  const Vector4d error = PositionError(station, sight, center);
   const Eigen::Matrix3d& R = station.world_from_robot.rotation;
-  const Vector3d q = R.transpose() * (object.center - station.world_from_robot.translation);
+  const Vector3d q = sight.value.head<3>() - error.head<3>();
+  linear->depth = 0;
   linear->by_pose.setZero();
   linear->by_object.setZero();
   for (int axis = 0; axis < 3; ++axis) {
@@ -127,6 +138,7 @@ void LinearizePosition(const Station& station,
     }
   }
   linear->by_object.template topLeftCorner<3, 3>() = -R.transpose();
+  return error;
 }
 
 }  // namespace
@@ -138,12 +150,10 @@ double CostOfSight(const Model& model,
                    double depth,
                    double* chi_square) {
   const Surface<double> object = SurfaceOf(chart);
-  Vector4d error = Vector4d::Zero();
+  Vector4d error;
   *chi_square = std::numeric_limits<double>::infinity();
   if (!sight.is_box) {
-    const Rigid<double>& robot = station.world_from_robot;
-    error.head<3>() =
-        sight.value.head<3>() - robot.rotation.transpose() * (object.center - robot.translation);
+    error = PositionError(station, sight, object.center);
   } else if (!EdgeErrors<false>(
                  model.camera, sight, ToCamera(station.camera, object), depth, &error, nullptr)) {
     return *chi_square;
@@ -161,19 +171,11 @@ void Linearize(const Model& model,
                const Vector9d& chart,
                Edges edges,
                Linear<Pose>* linear) {
-  Vector4d error = Vector4d::Zero();
-  if (sight.is_box) {
-    LinearizeBox<Pose>(model, station, sight, chart, edges, &error, linear);
-  } else {
-    const Surface<double> object = SurfaceOf(chart);
-    const Rigid<double>& robot = station.world_from_robot;
-    error.head<3>() =
-        sight.value.head<3>() - robot.rotation.transpose() * (object.center - robot.translation);
-    linear->depth = 0;
-    LinearizePosition<Pose>(station, object, linear);
-  }
+  const Unpacked<ChartModel> object(chart);
   const Eigen::Matrix4d& W = sight.sqrt_information;
-  linear->residual = W * error;
+  linear->residual =
+      W * (sight.is_box ? LinearizeBox(model, station, sight, object, edges, linear)
+                        : LinearizePosition(station, sight, object.surface.center, linear));
   linear->chi_square = linear->residual.squaredNorm();
   double loss;
   Weigh(sight.is_box ? model.loss_scale : 0, linear->chi_square, &linear->cost, &loss);
