@@ -81,10 +81,11 @@ def predict_boxes(
         [np.tile(np.arange(k), (len(row), 1)), k + 9 * row[:, None] + np.arange(9)], 1
     )
     joint = covariance[own[:, :, None], own[:, None, :]]
-    spread = jacobian @ joint @ jacobian.transpose(0, 2, 1)
     # Of what nearly touches the camera, or may be anywhere in the image, nothing is predicted.
     size = float(np.hypot(camera.width, camera.height))
-    variance = np.trace(np.nan_to_num(spread, nan=np.inf), axis1=1, axis2=2)
+    with np.errstate(over="ignore", invalid="ignore"):
+        spread = jacobian @ joint @ jacobian.transpose(0, 2, 1)
+        variance = np.trace(np.nan_to_num(spread, nan=np.inf), axis1=1, axis2=2)
     known = np.isfinite(spread).all(axis=(1, 2)) & (variance < size**2)
     return PredictedBoxes(row[known], box[row[known]], spread[known])
 
