@@ -169,7 +169,7 @@ def test_a_bad_step_is_named_and_changes_nothing(problem):
     assert "class_name: expected 1 names" in refused(
         slam, STEP, StepBoxes([[1, 1, 9, 9]], [1], ["a", "b"])
     )
-    assert "no box has shown object 55" in refused(
+    assert "object 55 is not in the map yet" in refused(
         slam, STEP, positions=StepPositions([55], [[1, 0, 0]], [np.eye(3)])
     )
     # And on it goes, as if nothing had been.

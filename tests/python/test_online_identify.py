@@ -158,6 +158,34 @@ def test_what_arrives_during_a_polish_is_kept():
     assert_found(made, slam, recall=0.9)
 
 
+def test_a_late_polish_overrules_nothing_that_has_changed_meanwhile():
+    """A tracklet and an object left out since stay; changes of the part are taken over."""
+    made = table(0)
+    slam = followed(made)
+    journal, identifier = slam._journal, slam._identifier
+    part = identifier._part(slam._session, 0)
+    mine, theirs = sorted(journal.object_of_tracklet)[:2]
+    part.scene.object_of_tracklet[mine] = 1
+    part.scene.left_out[2] = "it moved"
+    journal.object_of_tracklet[theirs] = 3
+    journal.left_out = {4: "it moved, too"}
+    tracklet = journal.keyframes[5].tracklet
+    journal.keyframes[5].tracklet = tracklet + 1000
+    identifier._tell(slam._session, slam._registry, part)
+    assert journal.object_of_tracklet[mine] == 1
+    assert journal.object_of_tracklet[theirs] == 3
+    assert set(journal.left_out) == {2, 4}
+    np.testing.assert_array_equal(journal.keyframes[5].tracklet, tracklet + 1000)
+
+
+def test_a_box_that_is_not_finite_is_named():
+    slam = OnlineSlam(CAMERA, trust_ids=0.9)
+    with pytest.raises(
+        StepError, match=r"step 0: boxes row 1: NaN or infinite: \[1.0, nan, 3.0, 4.0\]"
+    ):
+        slam.add(None, StepBoxes([[1, 2, 3, 4], [1, np.nan, 3, 4]], [-1, -1]))
+
+
 def test_a_bad_step_changes_nothing():
     made = table(0)
     steps = list(steps_of(made.recording))

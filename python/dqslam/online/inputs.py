@@ -99,7 +99,7 @@ def position_rows(
     ids = np.asarray(positions.object_id).tolist()
     unknown = [number for number in ids if number not in registry]
     if unknown:
-        raise ValueError(f"positions: no box has shown object {unknown[0]} yet")
+        raise ValueError(f"positions: object {unknown[0]} is not in the map yet")
     rows = np.array([registry.row_of(number) for number in ids], dtype=np.int32)
     covariance = np.asarray(positions.covariance, dtype=np.float64).reshape(len(ids), 9)
     return rows, np.asarray(positions.object_in_robot, dtype=np.float64), covariance

@@ -36,8 +36,19 @@ class Part:
     begin: int
     box_object: Ints
     """What the boxes showed when that was last the same here and there, shape (m,)."""
+    tracklet: Ints
+    """Their tracklets then, shape (m,)."""
+    object_of_tracklet: dict[int, int]
+    left_out: dict[int, str]
     objects: int
     """How many objects there were then."""
+
+    @classmethod
+    def of(cls, scene: SceneMap, begin: int) -> Part:
+        """Take a map that agrees with the journal."""
+        part = cls(scene, begin, scene.box_object, scene.tracklet, {}, {}, 0)
+        part.is_taken()
+        return part
 
     def born(self) -> list[int]:
         """Return the rows of objects that are new and have boxes."""
@@ -47,6 +58,9 @@ class Part:
     def is_taken(self) -> None:
         """Remember that what has changed is known."""
         self.box_object = self.scene.box_object.copy()
+        self.tracklet = self.scene.tracklet.copy()
+        self.object_of_tracklet = dict(self.scene.object_of_tracklet)
+        self.left_out = dict(self.scene.left_out)
         self.objects = len(self.scene.ellipsoids)
         self.scene.joined.clear()
 
@@ -99,7 +113,7 @@ def cut_part(
     scene.left_out = dict(journal.left_out)
     scene.prior_covariance = journal.map_covariance
     scene.free_tracklet = free_tracklet
-    return Part(scene, begin, scene.box_object.copy(), len(scene.ellipsoids))
+    return Part.of(scene, begin)
 
 
 def _detections(journal: Journal, frames: list[Keyframe]) -> Detections:

@@ -98,6 +98,9 @@ def check_boxes(boxes: StepBoxes | None) -> CheckedBoxes:
     count = len(box)
     if box.shape != (count, 4):
         raise ValueError(f"boxes: expected shape (n, 4), got {box.shape}")
+    if not np.isfinite(box).all():
+        row = int(np.flatnonzero(~np.isfinite(box).all(axis=1))[0])
+        raise ValueError(f"boxes row {row}: NaN or infinite: {box[row].tolist()}")
     object_id = np.asarray(boxes.object_id)
     if object_id.shape != (count,) or object_id.dtype.kind not in "iu":
         raise ValueError(f"object_id: expected {count} whole numbers")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import TypeVar
 
 import numpy as np
 
@@ -14,6 +15,8 @@ from dqslam.online.journal import Journal
 from dqslam.online.objects import Registry
 from dqslam.online.part import Part
 from dqslam.size_prior import SizePrior
+
+_T = TypeVar("_T")
 
 
 def tell(
@@ -39,17 +42,17 @@ def tell(
         for sight in list(journal.boxes_of(given_up)):  # those before the part
             told[sight] = number_of[_last(scene.joined, given_up)]
             journal.give(sight, told[sight])
-    for tracklet in np.unique(scene.tracklet).tolist():
-        journal.object_of_tracklet.pop(tracklet, None)
-    for tracklet, row in scene.object_of_tracklet.items():
-        journal.object_of_tracklet[tracklet] = number_of[row]
+    now = {one: number_of[row] for one, row in scene.object_of_tracklet.items() if row in number_of}
+    _take_changes(journal.object_of_tracklet, part.object_of_tracklet, now)
     priors = priors_of(scene, born)
     named = sorted(set(told.values()) - {-1})
     new = [number_of[row] for row in born]
     ids = [journal.claim_of(number) if ids_are_final else -1 for number in new]
     registry.take({number: journal.called(number) for number in named}, ids, priors)
     _relabel_known(session, told, journal.left_out, scene.ellipsoids[born], priors)
-    left_out = {number_of[row]: why for row, why in scene.left_out.items() if row in number_of}
+    why_out = {number_of[row]: why for row, why in scene.left_out.items() if row in number_of}
+    left_out = dict(journal.left_out)
+    _take_changes(left_out, part.left_out, why_out)
     changed = left_out.keys() ^ journal.left_out.keys()
     journal.left_out = left_out
     told = {sight: number for number in changed for sight in journal.boxes_of(number)}
@@ -71,13 +74,25 @@ def _take_boxes(part: Part, journal: Journal, number_of: dict[int, int]) -> dict
         first = rows.stop
         if first > len(scene.box_object):
             break  # it is newer than the part
-        frame.tracklet = scene.tracklet[rows].copy()
+        cut = scene.tracklet[rows] != part.tracklet[rows]
+        frame.tracklet = np.where(cut, scene.tracklet[rows], frame.tracklet)
         now, before = scene.box_object[rows], part.box_object[rows]
         for row in np.flatnonzero((now != before) & (frame.object == before)).tolist():
             sight = int(frame.sight[row])
             told[sight] = number_of[int(now[row])] if now[row] >= 0 else -1
             journal.give(sight, told[sight])
     return told
+
+
+def _take_changes(known: dict[int, _T], before: dict[int, _T], now: dict[int, _T]) -> None:
+    """Change what is known as ``before`` has become ``now``, but for what is no more as before."""
+    for key in before.keys() | now.keys():
+        if before.get(key) == now.get(key) or known.get(key) != before.get(key):
+            continue
+        if key in now:
+            known[key] = now[key]
+        else:
+            known.pop(key, None)
 
 
 def _last(joined: dict[int, int], number: int) -> int:
