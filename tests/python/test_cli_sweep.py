@@ -123,7 +123,7 @@ def test_ctrl_c_is_one_line_and_what_is_done_is_kept(command, tmp_path):
         # A test run in the background of a shell ignores Ctrl-C, and hands that on.
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
-    while not list(trials.glob("*.json")) and run.poll() is None:
+    while not list(trials.glob("[!.]*.json")) and run.poll() is None:
         time.sleep(0.005)
     os.killpg(run.pid, signal.SIGINT)
     _, said = run.communicate(timeout=60)
