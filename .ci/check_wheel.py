@@ -31,7 +31,7 @@ def faults(wheel: Path) -> list[str]:
         paths = [PurePosixPath(name) for name in archive.namelist()]
         files = {path: archive.read(str(path)) for path in paths if ".so" in path.name}
     licenses = {path.name for path in paths if path.parent.name == "licenses"}
-    found += [f"the licence {name} is missing" for name in sorted(LICENSES - licenses)]
+    found += [f"the license {name} is missing" for name in sorted(LICENSES - licenses)]
     if [path.name.split(".")[0] for path in files] != ["_core"]:
         found.append(f"its binaries are {', '.join(map(str, files)) or 'none'}, not _core alone")
     for path, content in files.items():

@@ -15,7 +15,7 @@ import numpy as np
 import dqslam as dq
 
 SEEDS = range(5)
-TOLERANCE = 1e-9  # of every number: metres, radians, log-metres
+TOLERANCE = 1e-9  # of every number: meters, radians, log-meters
 
 # What a Ceres of a Linux distribution brings along; libgomp comes with its CHOLMOD.
 FOREIGN = r"lib(ceres|glog|gflags|gomp|cholmod|spqr|suitesparse\w*|cxsparse|amd|colamd|metis)[-.]"

@@ -9,9 +9,9 @@ import typer
 from rich.console import Console
 
 from benchmarks import compare, report
-from benchmarks.cases import ALL_PROGRAMS, CASES, DEFAULT_CASES, LINEARISE, ONLINE
+from benchmarks.cases import ALL_PROGRAMS, CASES, DEFAULT_CASES, LINEARIZE, ONLINE
 from benchmarks.figure import plot_scaling, scaling_cases
-from benchmarks.linearise import PROGRAM, linearise
+from benchmarks.linearize import PROGRAM, linearize
 from benchmarks.machine import describe
 from benchmarks.measure import (
     ROOT,
@@ -22,11 +22,11 @@ from benchmarks.measure import (
     scipy_command,
 )
 from benchmarks.peers import PeerMissingError, gtsam_command
-from benchmarks.results import Linearised, Measured, Results, load_results, save_results
+from benchmarks.results import Linearized, Measured, Results, load_results, save_results
 
 _WIDTH = 125  # of the tables, characters: in a file they are not squeezed
 _PROGRAMS = (*ALL_PROGRAMS, ONLINE)
-_HELP = f"Of {', '.join([*CASES, LINEARISE])}; by default {', '.join(DEFAULT_CASES)}."
+_HELP = f"Of {', '.join([*CASES, LINEARIZE])}; by default {', '.join(DEFAULT_CASES)}."
 
 
 def bench(
@@ -53,22 +53,22 @@ def bench(
     """Measure dqslam and its peers side by side; exit status 1 where a baseline was better."""
     console = Console(width=max(_WIDTH, Console().width))
     cases = cases or list(DEFAULT_CASES)
-    _check("case", cases, [*CASES, LINEARISE])
+    _check("case", cases, [*CASES, LINEARIZE])
     chosen = programs.split(",")
     _check("program", chosen, _PROGRAMS)
     before = _baseline(baseline) if baseline else None
 
     skipped: dict[str, str] = {}
-    linearised = _linearised(repeat, skipped) if LINEARISE in cases else ()
+    linearized = _linearized(repeat, skipped) if LINEARIZE in cases else ()
     commands = _commands(chosen, skipped)
     measured: list[Measured] = []
     for name in cases:
-        if name != LINEARISE:
+        if name != LINEARIZE:
             case = CASES[name]
             solving = {key: commands[key] for key in case.programs if key in commands}
             problem = case.problem(seed, noise)
             measured += measure(name, problem, solving, repeat=repeat, limit_s=limit, progress=_say)
-    results = Results(describe(), _version(), seed, tuple(measured), linearised, skipped)
+    results = Results(describe(), _version(), seed, tuple(measured), linearized, skipped)
     out.mkdir(parents=True, exist_ok=True)
     save_results(results, out / "bench.json")
     for table in report.tables(results):
@@ -122,11 +122,11 @@ def _commands(chosen: list[str], skipped: dict[str, str]) -> dict[str, Command]:
     return commands
 
 
-def _linearised(repeat: int, skipped: dict[str, str]) -> tuple[Linearised, ...]:
+def _linearized(repeat: int, skipped: dict[str, str]) -> tuple[Linearized, ...]:
     try:
-        return linearise(repeat)
+        return linearize(repeat)
     except FileNotFoundError:
-        skipped[LINEARISE] = f"{PROGRAM.relative_to(ROOT)} was not built"
+        skipped[LINEARIZE] = f"{PROGRAM.relative_to(ROOT)} was not built"
         return ()
 
 

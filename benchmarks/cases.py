@@ -35,5 +35,5 @@ CASES = {
     "online-5k": Case(partial(chain, 9, 11), noise=0.1, programs=("dqslam", ONLINE)),
     "million": Case(partial(chain, 356, 12), noise=0.01),
 }
-LINEARISE = "linearise"
-DEFAULT_CASES = ("paper", "peer-1", "peer-9", LINEARISE)
+LINEARIZE = "linearize"
+DEFAULT_CASES = ("paper", "peer-1", "peer-9", LINEARIZE)

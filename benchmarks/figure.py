@@ -8,8 +8,8 @@ from benchmarks.results import Measured, Results
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# In shades that the colour-blind can tell apart (Okabe and Ito).
-_COLOURS = {"dqslam": "#D55E00", "gtsam_quadrics": "#0072B2", "scipy": "#009E73"}
+# In shades that the color-blind can tell apart (Okabe and Ito).
+_COLORS = {"dqslam": "#D55E00", "gtsam_quadrics": "#0072B2", "scipy": "#009E73"}
 
 
 def scaling_cases(results: Results) -> dict[str, list[Measured]]:
@@ -41,10 +41,10 @@ def plot_scaling(results: Results, path: Path) -> None:
     time, memory = figure.subplots(1, 2)
     for program, measured in cases.items():
         boxes = [one.size["boxes"] for one in measured]
-        style = {"color": _COLOURS.get(program), "marker": "o", "label": program}
+        style = {"color": _COLORS.get(program), "marker": "o", "label": program}
         middle, least, greatest = zip(*(one.cpu_s() for one in measured), strict=True)
         time.plot(boxes, middle, **style)
-        time.fill_between(boxes, least, greatest, color=_COLOURS.get(program), alpha=0.2)
+        time.fill_between(boxes, least, greatest, color=_COLORS.get(program), alpha=0.2)
         memory.plot(boxes, [one.peak_mb for one in measured], **style)
     reference = next(iter(cases.values()))
     _draw_linear(time, reference)

@@ -44,7 +44,7 @@ def save_problem(problem: Problem, path: str | Path) -> None:
 
 
 def load_problem(path: str | Path) -> tuple[Recording, Floats]:
-    """Read the recording of a problem, and the centres where peers start its objects, (o, 3)."""
+    """Read the recording of a problem, and the centers where peers start its objects, (o, 3)."""
     with np.load(path) as arrays:
         count = len(arrays["box"])
         recording = Recording(

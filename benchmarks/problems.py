@@ -18,12 +18,12 @@ _STEP_M = 0.25
 _SIDES_M = (20.0, 12.5, 20.0, 12.5)
 _GAP_M = 20.0
 _RADII_M = np.array([0.5, 0.4, 0.3])
-_APART_M = 1.6  # of two objects' centres on the ground, at least
-_DEPTH_M = (1.0, 25.0)  # at which a centre is seen
+_APART_M = 1.6  # of two objects' centers on the ground, at least
+_DEPTH_M = (1.0, 25.0)  # at which a center is seen
 _CAMERA_HEIGHT_M = 1.0
 _SIGMA_M, _LATERAL_SIGMA_M = 0.02, 0.005
 _SIGMA_RAD, _TURN_SIGMA_RAD = 0.02, 0.1
-_START_SIGMA_M = 0.3  # of the centres that peers start from
+_START_SIGMA_M = 0.3  # of the centers that peers start from
 BOX_SIGMA_PX = 1.0
 
 
@@ -35,9 +35,9 @@ class Problem:
     """Boxes have a noise of BOX_SIGMA_PX."""
     truth: Truth
     peer_centers: Floats
-    """Where peers start the objects that have boxes, ids ascending, metres, shape (o, 3).
+    """Where peers start the objects that have boxes, ids ascending, meters, shape (o, 3).
 
-    They have no start of their own: each gets the true centre relative to the first pose that saw
+    They have no start of their own: each gets the true center relative to the first pose that saw
     it, in the frame of the dead-reckoned one, with a noise of 0.3 m. Kinder than what dqslam has.
     """
 
@@ -116,7 +116,7 @@ def _drive(areas: int) -> tuple[Floats, Ints]:
 
 
 def _objects(areas: int, count: int, random: Generator) -> tuple[Floats, Floats]:
-    """Return centres, metres, shape (o, 3), and headings, radians, shape (o,)."""
+    """Return centers, meters, shape (o, 3), and headings, radians, shape (o,)."""
     center, yaw = [], []
     low, high = np.array([2.5, 3.0, 0.6]), np.array([17.5, 9.5, 1.6])
     for area in range(areas):
@@ -184,7 +184,7 @@ def _exact_boxes(
 
 
 def _in_view(camera: Camera, poses: Floats, centers: Floats) -> Bools:
-    """Tell which centres are inside of the image, at a depth that is seen; shape (n, o)."""
+    """Tell which centers are inside of the image, at a depth that is seen; shape (n, o)."""
     from_robot = centers[None, :, :2] - poses[:, None, :2]
     cos, sin = np.cos(poses[:, 2:]), np.sin(poses[:, 2:])
     forward = cos * from_robot[..., 0] + sin * from_robot[..., 1]

@@ -5,7 +5,7 @@ from statistics import median
 from typing import TYPE_CHECKING
 
 from benchmarks.compare import DQSLAM, Change
-from benchmarks.results import Linearised, Measured, Results, spread
+from benchmarks.results import Linearized, Measured, Results, spread
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -21,8 +21,8 @@ def tables(results: Results) -> Iterator["Table"]:
         yield answer_table(results)
         if any(run.step_ms for one in results.measured for run in one.runs):
             yield step_table(results)
-    if results.linearised:
-        yield linearised_table(results.linearised)
+    if results.linearized:
+        yield linearized_table(results.linearized)
 
 
 def speed_table(results: Results) -> "Table":
@@ -79,7 +79,7 @@ def step_table(results: Results) -> "Table":
 
 def answer_table(results: Results) -> "Table":
     """Lay out how good the answers are: speed shall not hide a worse one."""
-    columns = ("poses", "objects", "boxes", "RMSE m", "aligned m", "centres m", "boxes px")
+    columns = ("poses", "objects", "boxes", "RMSE m", "aligned m", "centers m", "boxes px")
     table = _table("Answers", "case", "program", *columns, "impossible", "cost")
     for one in results.measured:
         score = one.runs[-1].score
@@ -97,10 +97,10 @@ def answer_table(results: Results) -> "Table":
     return table
 
 
-def linearised_table(linearised: Sequence[Linearised]) -> "Table":
+def linearized_table(linearized: Sequence[Linearized]) -> "Table":
     """Lay out the C++ benchmark."""
     table = _table("Residuals and Jacobians", "measurement", "CPU ns (least, greatest)")
-    for one in linearised:
+    for one in linearized:
         middle, least, greatest = spread(list(one.cpu_ns))
         table.add_row(one.name, f"{middle:.0f} ({least:.0f}, {greatest:.0f})")
     return table

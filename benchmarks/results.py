@@ -28,7 +28,7 @@ class Score:
     aligned_rmse_m: float
     """The same without the global rigid motion."""
     center_rmse_m: float
-    """Likewise of the objects' centres, in space, no alignment."""
+    """Likewise of the objects' centers, in space, no alignment."""
     box_rms_px: float
     """Root mean square difference between edges of predicted and measured boxes."""
     impossible_boxes: int
@@ -44,7 +44,7 @@ class Run:
     peak_mb: float = 0.0
     iterations: int = 0
     cost: float = 0.0
-    """What this program minimised, at the end: half the sum of squares in sigmas."""
+    """What this program minimized, at the end: half the sum of squares in sigmas."""
     start_seconds: float | None = None
     """Wall clock inside of solve, where the program tells: starting objects."""
     evaluation_seconds: float | None = None
@@ -88,8 +88,8 @@ class Measured:
 
 
 @dataclass(frozen=True)
-class Linearised:
-    """Time to linearise one measurement, from Google Benchmark."""
+class Linearized:
+    """Time to linearize one measurement, from Google Benchmark."""
 
     name: str
     cpu_ns: tuple[float, ...]
@@ -104,7 +104,7 @@ class Results:
     version: str
     seed: int
     measured: tuple[Measured, ...]
-    linearised: tuple[Linearised, ...] = ()
+    linearized: tuple[Linearized, ...] = ()
     skipped: dict[str, str] = field(default_factory=dict)
     """Programs that could not run here, and why."""
 

@@ -51,7 +51,7 @@ print(f"standard deviation of the last position: {sigma[-1]:.2f} m")
 # %%
 # The map from above
 # ------------------
-# From above, an ellipsoid of centre c and shape S is the ellipse of the upper left block of S.
+# From above, an ellipsoid of center c and shape S is the ellipse of the upper left block of S.
 # Small ellipses along the path hold the position with 95 %, enlarged five times.
 
 

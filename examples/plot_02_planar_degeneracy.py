@@ -10,7 +10,7 @@ motions, poses known, boxes exact to a pixel. The reasoning is in :doc:`/planar_
 import matplotlib.pyplot as plt
 import numpy as np
 
-from dqslam.degeneracy import MOTIONS, run_degeneracy
+from dqslam.studies.degeneracy import MOTIONS, run_degeneracy
 
 TRIALS = 8
 table = run_degeneracy(trials=TRIALS, seed=0)
@@ -50,6 +50,6 @@ for side, (estimator, color) in enumerate([("paper", "#E69F00"), ("dqslam", "#00
 axes.set_yscale("log")
 axes.set_ylim(0.1, 1e5)
 axes.set_xticks(range(len(MOTIONS)), MOTIONS)
-axes.set_ylabel("median error of the centre [mm]")
+axes.set_ylabel("median error of the center [mm]")
 axes.legend(frameon=False)
 plt.show()

@@ -24,7 +24,7 @@ print(f"{len(is_right)} boxes, {(~is_right).sum()} of them with a wrong id")
 # Three ways to take them
 # -----------------------
 # Graduated non-convexity with the Geman-McClure loss starts with all boxes and slowly hardens its
-# judgement. It is what ``dqslam paper`` takes when ids are wrong.
+# judgment. It is what ``dqslam paper`` takes when ids are wrong.
 
 graph = dq.build_graph(recording)
 estimates = {

@@ -17,7 +17,7 @@ import numpy as np
 
 import dqslam as dq
 from dqslam import io
-from dqslam.run_recording import perturb_odometry, run
+from dqslam.pipeline import perturb_odometry, run
 
 folder = Path(os.environ.get("DQSLAM_REALDATA", "realdata")) / "bop_lmo"
 segment = folder / "seg_0703_1001"

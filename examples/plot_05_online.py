@@ -23,11 +23,11 @@ recording, truth = dq.simulate(scenario, seed=4)
 
 slam = dq.OnlineSlam(recording.camera, box_noise=dq.BoxNoise(pixels=1.0, relative=0.0))
 now = []
-linearised = []
+linearized = []
 for step in dq.steps_of(recording):
     report = slam.add(step.odometry, step.boxes, timestamp=step.timestamp)
     now.append(slam.pose)
-    linearised.append(report.linearized)
+    linearized.append(report.linearized)
 now = np.array(now)
 last = slam.trajectory
 slam.polish()
@@ -41,7 +41,7 @@ print(f"{len(slam)} steps, {len(slam.objects.ids)} objects")
 
 
 def error(path):
-    """Return the distance of each pose from its true place, metres."""
+    """Return the distance of each pose from its true place, meters."""
     return np.linalg.norm(path[:, :2] - truth.poses[:, :2], axis=1)
 
 
@@ -62,10 +62,10 @@ plt.show()
 # %%
 # What a step costs
 # -----------------
-# Boxes that were linearised: a few for the window of recent poses, more where objects of the first
+# Boxes that were linearized: a few for the window of recent poses, more where objects of the first
 # round come back into view and the path behind them is moved.
 
 figure, axes = plt.subplots(figsize=(8, 2.8), layout="constrained")
-axes.semilogy(recording.timestamps, np.maximum(linearised, 1), ".", color="#0072B2")
-axes.set(xlabel="time [s]", ylabel="boxes linearised", xlim=(0, None))
+axes.semilogy(recording.timestamps, np.maximum(linearized, 1), ".", color="#0072B2")
+axes.set(xlabel="time [s]", ylabel="boxes linearized", xlim=(0, None))
 plt.show()

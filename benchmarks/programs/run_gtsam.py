@@ -20,8 +20,8 @@ Floats = NDArray[np.float64]
 Given = dict[str, NDArray[Any]]  # the arrays of files.save_problem
 
 _START_RADIUS_M = 0.5
-_OFF_PLANE_SIGMA = 1e-3  # metres and radians
-_FIRST_POSE_SIGMA = 1e-4  # metres and radians: the gauge
+_OFF_PLANE_SIGMA = 1e-3  # meters and radians
+_FIRST_POSE_SIGMA = 1e-4  # meters and radians: the gauge
 
 
 def main(problem: str, answer: str) -> None:
@@ -102,7 +102,7 @@ def in_camera(covariance: Floats, robot_from_camera: Floats) -> Floats:
 
 
 def start(given: Given) -> Any:
-    """Start poses where odometry says, objects at their given centres."""
+    """Start poses where odometry says, objects at their given centers."""
     values = gtsam.Values()
     for row, pose in enumerate(given["camera_poses"]):
         values.insert(pose_key(row), gtsam.Pose3(pose))

@@ -42,7 +42,7 @@ def main(problem: str, answer: str) -> None:
                 initial,
                 jac_sparsity=sparsity,
                 x_scale="jac",
-                tr_options={"regularize": False},  # regularised, it creeps
+                tr_options={"regularize": False},  # regularized, it creeps
             )
             initial = found.x
             iterations += found.njev
@@ -137,7 +137,7 @@ class Residuals:
         )
 
     def _in_camera(self, poses: Floats, ellipsoids: Floats) -> tuple[Floats, Floats]:
-        """Return centres (b, 3) and shape factors L (b, 3, 3) in the camera of each box."""
+        """Return centers (b, 3) and shape factors L (b, 3, 3) in the camera of each box."""
         from scipy.spatial.transform import Rotation
 
         seen_from = _core.world_from_camera(PoseModel.SE2, self._core.camera, poses)
@@ -147,7 +147,7 @@ class Residuals:
         return (turn @ offset)[..., 0], turn @ _factors(ellipsoids)[self._box_object]
 
     def _tangents(self, poses: Floats, ellipsoids: Floats) -> Floats:
-        """Return n.p + |L^T n| of the plane behind each edge, metres, (b, 4)."""
+        """Return n.p + |L^T n| of the plane behind each edge, meters, (b, 4)."""
         center, factor = self._in_camera(poses, ellipsoids)
         reach = np.linalg.norm(self._normals @ factor, axis=2)
         return np.asarray((self._normals @ center[..., None])[..., 0] + reach)
@@ -169,7 +169,7 @@ class Residuals:
 
 
 def _factors(ellipsoids: Floats) -> Floats:
-    """Return the Cholesky factors L of the shapes, metres, (o, 3, 3)."""
+    """Return the Cholesky factors L of the shapes, meters, (o, 3, 3)."""
     factors = np.zeros((len(ellipsoids), 3, 3))
     factors[:, [0, 1, 2], [0, 1, 2]] = np.exp(ellipsoids[:, 3:6])
     factors[:, [1, 2, 2], [0, 0, 1]] = ellipsoids[:, 6:]

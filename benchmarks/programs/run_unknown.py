@@ -15,8 +15,8 @@ from benchmarks.cases import CASES
 from benchmarks.programs.run_online import NOISE, spread
 from dqslam import Loss, OnlineSlam, Recording, SolveOptions, associate, build_graph, solve
 from dqslam._checks import Floats, Ints
-from dqslam.associate import UNSURE, fill_in
-from dqslam.evaluate import score_association
+from dqslam.association import UNSURE, fill_in
+from dqslam.metrics import score_association
 from dqslam.online import replay
 
 

@@ -2,7 +2,7 @@
 #include <pybind11/stl.h>
 
 #include "bindings.h"
-#include "dqslam/covariance.h"
+#include "dqslam/estimation/covariance.h"
 
 namespace py = pybind11;
 using namespace pybind11::literals;

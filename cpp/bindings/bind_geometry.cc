@@ -3,8 +3,8 @@
 #include <pybind11/stl.h>
 
 #include "bindings.h"
-#include "dqslam/ellipsoid.h"
-#include "dqslam/rows.h"
+#include "dqslam/geometry/batch.h"
+#include "dqslam/geometry/ellipsoid.h"
 
 namespace py = pybind11;
 using namespace pybind11::literals;
@@ -106,7 +106,7 @@ void BindEllipsoid(py::module_& m) {
         "center"_a,
         "semi_axes"_a,
         "orientation_xyzw"_a,
-        "Log-Cholesky parameters (9,) of a centre, semi-axes [m] and world_from_object rotation.");
+        "Log-Cholesky parameters (9,) of a center, semi-axes [m] and world_from_object rotation.");
   m.def(
       "axes_from_ellipsoid",
       [](const Vector9d& ellipsoid) {
@@ -114,7 +114,7 @@ void BindEllipsoid(py::module_& m) {
         return std::make_tuple(axes.center, axes.semi_axes, axes.orientation_xyzw);
       },
       "ellipsoid"_a,
-      "Centre (3,), semi-axes (3,) descending [m], orientation x y z w (4,).");
+      "Center (3,), semi-axes (3,) descending [m], orientation x y z w (4,).");
   m.def("dual_quadric_from_ellipsoid",
         &DualQuadricFromEllipsoid,
         "ellipsoid"_a,

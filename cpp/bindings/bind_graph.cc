@@ -2,7 +2,7 @@
 #include <pybind11/stl.h>
 
 #include "bindings.h"
-#include "dqslam/graph.h"
+#include "dqslam/problem/graph.h"
 
 namespace py = pybind11;
 using namespace pybind11::literals;
@@ -20,14 +20,14 @@ void BindGraph(py::module_& m) {
            "Any of the attributes as keywords.")
       .def_readwrite("up", &ScenePriors::up, "Unit normal n of the ground, in the world, (3,).")
       .def_readwrite(
-          "plane_offset", &ScenePriors::plane_offset, "d of the ground n.x + d = 0, metres.")
+          "plane_offset", &ScenePriors::plane_offset, "d of the ground n.x + d = 0, meters.")
       .def_readwrite("upright_sigma",
                      &ScenePriors::upright_sigma,
                      "A principal axis of each object is vertical: radians.")
       .def_readwrite(
-          "support_sigma", &ScenePriors::support_sigma, "Each object stands on the ground: metres.")
-      .def_readwrite("camera_height", &ScenePriors::camera_height, "Metres above the ground.")
-      .def_readwrite("camera_height_sigma", &ScenePriors::camera_height_sigma, "Metres.");
+          "support_sigma", &ScenePriors::support_sigma, "Each object stands on the ground: meters.")
+      .def_readwrite("camera_height", &ScenePriors::camera_height, "Meters above the ground.")
+      .def_readwrite("camera_height_sigma", &ScenePriors::camera_height_sigma, "Meters.");
   py::class_<Graph>(m, "Graph", "The problem as plain tables; ids are row numbers. Immutable.")
       .def(py::init([](PoseModel pose_model,
                        const Camera& camera,
@@ -84,8 +84,8 @@ void BindGraph(py::module_& m) {
            "Shapes, with d the size of a pose and k of its tangent: initial_poses (n, d); odometry "
            "(m, d), to_in_from, with covariance (m, k * k); boxes (b, 4) undistorted pixels with "
            "covariance (b, 16) and box_truncated (b, 4), edges cut by the image border; positions "
-           "(p, 3) object_in_robot, metres, with covariance (p, 9); "
-           "log_size_mean and log_size_sigma (o,), of semi-axes in log metres.")
+           "(p, 3) object_in_robot, meters, with covariance (p, 9); "
+           "log_size_mean and log_size_sigma (o,), of semi-axes in log meters.")
       .def_readonly("pose_model", &Graph::pose_model)
       .def_readonly("camera", &Graph::camera)
       .def_readonly("initial_poses", &Graph::initial_poses, "Shape (n, d).")

@@ -2,7 +2,7 @@
 #include <pybind11/stl.h>
 
 #include "bindings.h"
-#include "dqslam/online/relocalise.h"
+#include "dqslam/online/relocalize.h"
 #include "dqslam/online/session.h"
 
 namespace py = pybind11;
@@ -12,9 +12,9 @@ namespace dqslam {
 namespace {
 
 using online::NewLabels;
-using online::NewSights;
 using online::OnlineOptions;
 using online::Session;
+using online::StepObservations;
 using online::StepReport;
 
 void BindOptions(py::module_& m) {
@@ -25,22 +25,22 @@ void BindOptions(py::module_& m) {
              return options.cast<OnlineOptions>();
            }),
            "Any of the attributes as keywords.")
-      .def_readwrite("window_poses", &OnlineOptions::window_poses, "Minimised at every step.")
+      .def_readwrite("window_poses", &OnlineOptions::window_poses, "Minimized at every step.")
       .def_readwrite("window_iterations",
                      &OnlineOptions::window_iterations,
                      "Levenberg-Marquardt steps of the window.")
-      .def_readwrite("recent_poses", &OnlineOptions::recent_poses, "Minimised now and then,")
+      .def_readwrite("recent_poses", &OnlineOptions::recent_poses, "Minimized now and then,")
       .def_readwrite("recent_every", &OnlineOptions::recent_every, "each so many steps.")
-      .def_readwrite("lap_poses", &OnlineOptions::lap_poses, "Minimised rarely,")
+      .def_readwrite("lap_poses", &OnlineOptions::lap_poses, "Minimized rarely,")
       .def_readwrite("lap_every", &OnlineOptions::lap_every, "each so many steps.")
       .def_readwrite("smoothing_iterations",
                      &OnlineOptions::smoothing_iterations,
                      "Levenberg-Marquardt steps of these two.")
-      .def_readwrite("tour_poses", &OnlineOptions::tour_poses, "Minimised by one such step,")
+      .def_readwrite("tour_poses", &OnlineOptions::tour_poses, "Minimized by one such step,")
       .def_readwrite("tour_every", &OnlineOptions::tour_every, "each so many steps.")
       .def_readwrite("loop_absence",
                      &OnlineOptions::loop_absence,
-                     "Poses without a sight before an object closes a loop.")
+                     "Poses without a observation before an object closes a loop.")
       .def_readwrite("loop_chi_square",
                      &OnlineOptions::loop_chi_square,
                      "Of the window, per residual: the loop does not fit.")
@@ -61,24 +61,26 @@ void BindOptions(py::module_& m) {
 void BindReport(py::module_& m) {
   py::class_<StepReport>(m, "StepReport", "What a step cost.")
       .def_readonly("pose", &StepReport::pose, "Row of the new pose.")
-      .def_readonly("first_sight",
-                    &StepReport::first_sight,
+      .def_readonly("first_observation",
+                    &StepReport::first_observation,
                     "Row of the first it saw: boxes as they were given, then positions.")
       .def_readonly("window_poses", &StepReport::window_poses, "Poses of the window.")
       .def_readonly("window_objects", &StepReport::window_objects, "Objects that it saw.")
       .def_readonly("linearized",
                     &StepReport::linearized,
-                    "Sights, in the window and to keep what lies before it.")
+                    "Observations, in the window and to keep what lies before it.")
       .def_readonly("undefined",
                     &StepReport::undefined,
-                    "Sights of the window whose objects are not in front.")
+                    "Observations of the window whose objects are not in front.")
       .def_readonly("chi_square",
                     &StepReport::chi_square,
                     "Of the window, per residual: 1 where the model is right.")
       .def_readonly("smoothed_poses",
                     &StepReport::smoothed_poses,
-                    "Poses minimised beside the window; 0 at most steps.")
-      .def_readonly("smoothed_sights", &StepReport::smoothed_sights, "Sights linearised there.")
+                    "Poses minimized beside the window; 0 at most steps.")
+      .def_readonly("smoothed_observations",
+                    &StepReport::smoothed_observations,
+                    "Observations linearized there.")
       .def_readonly("closed_loop", &StepReport::closed_loop)
       .def_readonly("recovered", &StepReport::recovered, "Young objects were started again.");
 }
@@ -107,15 +109,15 @@ void BindSession(py::module_& m) {
             const py::gil_scoped_release no_gil;
             return session.Add(relative,
                                covariance,
-                               NewSights{object,
-                                         box,
-                                         box_covariance,
-                                         truncated,
-                                         position_object,
-                                         position,
-                                         position_covariance,
-                                         log_size_mean,
-                                         log_size_sigma});
+                               StepObservations{object,
+                                                box,
+                                                box_covariance,
+                                                truncated,
+                                                position_object,
+                                                position,
+                                                position_covariance,
+                                                log_size_mean,
+                                                log_size_sigma});
           },
           "relative"_a,
           "covariance"_a,
@@ -135,20 +137,21 @@ void BindSession(py::module_& m) {
       .def(
           "relabel",
           [](Session& session,
-             const IndexVector& sight,
+             const IndexVector& observation,
              const IndexVector& object,
              const RowMatrix& ellipsoid,
              const Eigen::VectorXd& log_size_mean,
              const Eigen::VectorXd& log_size_sigma) {
             const py::gil_scoped_release no_gil;
-            session.Relabel(NewLabels{sight, object, ellipsoid, log_size_mean, log_size_sigma});
+            session.Relabel(
+                NewLabels{observation, object, ellipsoid, log_size_mean, log_size_sigma});
           },
-          "sight"_a,
+          "observation"_a,
           "object"_a,
           "ellipsoid"_a = RowMatrix(0, kLandmarkSize),
           "log_size_mean"_a = Eigen::VectorXd(),
           "log_size_sigma"_a = Eigen::VectorXd(),
-          "Give boxes (n,), by the rows of their sights, to other objects (n,): -1 waits, "
+          "Give boxes (n,), by the rows of their observations, to other objects (n,): -1 waits, "
           "num_objects "
           "+ i is a new object that starts from ellipsoid (m, 9), log-Cholesky, in the world.")
       .def("scale_odometry",
@@ -178,7 +181,7 @@ void BindSession(py::module_& m) {
           },
           "iterations"_a,
           "begin"_a = 0,
-          "Minimise the poses from begin on, the map's priors included; returns the cost.")
+          "Minimize the poses from begin on, the map's priors included; returns the cost.")
       .def("merge",
            &Session::Merge,
            "poses"_a,
@@ -202,7 +205,7 @@ void BindSession(py::module_& m) {
       .def_property_readonly("observations", &Session::Observations, "Boxes per object, (o,).");
 }
 
-void BindRelocalise(py::module_& m) {
+void BindRelocalize(py::module_& m) {
   using online::Relocation;
   py::class_<Relocation>(m, "Relocation", "Where the robot is in a map, and where else it may be.")
       .def_readonly("pose", &Relocation::pose, "world_from_robot, shape (d,).")
@@ -215,7 +218,7 @@ void BindRelocalise(py::module_& m) {
                     "Chi-square of the best other place with as many matches; infinite: none.")
       .def_readonly("other", &Relocation::other, "That place, shape (d,).");
   m.def(
-      "relocalise",
+      "relocalize",
       [](PoseModel pose_model,
          const Camera& camera,
          const RowMatrix& ellipsoids,
@@ -226,7 +229,7 @@ void BindRelocalise(py::module_& m) {
          const std::vector<std::vector<int>>& candidates,
          int fewest) {
         const py::gil_scoped_release no_gil;
-        return online::Relocalise(
+        return online::Relocalize(
             pose_model,
             camera,
             {ellipsoids, covariance, box, box_covariance, truncated, candidates},
@@ -249,7 +252,7 @@ void BindRelocalise(py::module_& m) {
 }  // namespace
 
 void BindOnline(py::module_& m) {
-  BindRelocalise(m);
+  BindRelocalize(m);
   BindOptions(m);
   BindReport(m);
   BindSession(m);

@@ -3,7 +3,7 @@
 #include <pybind11/stl.h>
 
 #include "bindings.h"
-#include "dqslam/solve.h"
+#include "dqslam/estimation/solve.h"
 
 namespace py = pybind11;
 using namespace pybind11::literals;
@@ -67,7 +67,7 @@ void BindEnums(py::module_& m) {
       .value("NATIVE", Backend::kNative)
       .value("CERES", Backend::kCeres)
       .finalize();
-  py::native_enum<Minimizer>(m, "Minimizer", "enum.Enum", "The minimiser of the last stage.")
+  py::native_enum<Minimizer>(m, "Minimizer", "enum.Enum", "The minimizer of the last stage.")
       .value("LEVENBERG_MARQUARDT", Minimizer::kLevenbergMarquardt)
       .value("DOGLEG", Minimizer::kDogleg)
       .finalize();
@@ -145,7 +145,7 @@ void BindSolution(py::module_& m) {
                     "Of all stages: residuals and their derivatives.")
       .def_readonly("linear_solver_seconds",
                     &Summary::linear_solver_seconds,
-                    "Of all stages: orderings, factorisations and solutions.")
+                    "Of all stages: orderings, factorizations and solutions.")
       .def_readonly("converged",
                     &Summary::converged,
                     "The last stage met a stopping test and accepted a step.")

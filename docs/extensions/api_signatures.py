@@ -2,7 +2,7 @@
 
 pybind11 writes what a caller may pass in full: ``typing.Annotated[numpy.typing.ArrayLike,
 numpy.float64, "[m, n]"]``. The shapes that matter are in the docstrings, with names and units.
-Napoleon takes an attribute's "Metres: of the centre" for a type and its explanation; it is a text.
+Napoleon takes an attribute's "Meters: of the center" for a type and its explanation; it is a text.
 """
 
 import re

@@ -18,7 +18,7 @@ EXAMPLES = 6  # maps drawn, as in the paper's figure
 def write_table(folder: Path, trials: int) -> None:
     """Run the experiment and write table and figure into a folder."""
     import dqslam as dq
-    from dqslam.experiment import PAPER_ODOMETRY, PAPER_ROWS, example_maps
+    from dqslam.studies.paper import PAPER_ODOMETRY, PAPER_ROWS, example_maps
 
     table = dq.run_paper(
         dq.load_scenario("paper"),
@@ -29,7 +29,7 @@ def write_table(folder: Path, trials: int) -> None:
     )
     dq.plot_maps(example_maps(table, min(EXAMPLES, trials)), folder / FIGURE)
     lines = [
-        "| mean / median | positions, m | centres, m | volumes, m³ |",
+        "| mean / median | positions, m | centers, m | volumes, m³ |",
         "|---|---|---|---|",
         f"| odometry, printed | {_pair(PAPER_ODOMETRY)} | | |",
         f"| odometry, this build | {_pair((table.odometry.avg, table.odometry.med))} | | |",

@@ -1,8 +1,8 @@
 """Links from the pages into the repository work in the site too.
 
-The pages link to files beside them, such as ``../cpp/dqslam/blocks.h``, which a forge shows. For
-the site each such file becomes a page of its own, under ``_generated/source``, and the links lead
-there.
+The pages link to files beside them, such as ``../cpp/dqslam/geometry/blocks.h``, which a forge
+shows. For the site each such file becomes a page of its own, under ``_generated/source``, and the
+links lead there.
 """
 
 import os

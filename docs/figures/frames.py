@@ -12,7 +12,7 @@ from matplotlib.patches import FancyArrowPatch, Polygon, Rectangle
 
 AXES = {"x": "#D55E00", "y": "#009E73", "z": "#0072B2"}
 INK, PALE = "#333333", "#e8edf2"
-# Columns: where one metre along x, y and z of the world goes on paper.
+# Columns: where one meter along x, y and z of the world goes on paper.
 PROJECTION = np.array([[0.85, 0.5, 0.0], [-0.3, 0.42, 1.0]])
 YAW = np.radians(20.0)  # of the robot
 WORLD_FROM_ROBOT = np.array(
@@ -118,7 +118,7 @@ def draw_image(axes):
     axes.text(box[2] - 0.15, box[3] - 0.3, "(u_max, v_max)", fontsize=9, ha="right")
     axes.plot(0, 0, "o", color="#0072B2", markersize=6)
     axes.annotate(
-        "centre of the first pixel: (0, 0)",
+        "center of the first pixel: (0, 0)",
         (0, 0),
         (1.6, -1.15),
         fontsize=9,

@@ -11,7 +11,7 @@ from PIL import Image, ImageDraw
 
 from dqslam import _core, io, load_scenario, simulate
 from dqslam.cli import main
-from dqslam.evaluate import project_outlines
+from dqslam.metrics import project_outlines
 
 HERE = Path(__file__).parent
 POSE = 45  # of the picture with outlines
@@ -72,7 +72,7 @@ def draw(folder):
 
 
 def keep(figure, name):
-    """Put a figure beside this file, with few colours."""
+    """Put a figure beside this file, with few colors."""
     image = Image.open(figure).convert("RGB").quantize(128, dither=Image.Dither.NONE)
     image.save(HERE / f"plot_{name}.png", optimize=True)
 

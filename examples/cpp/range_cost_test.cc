@@ -19,7 +19,7 @@ Vector9d SphereAt(const Eigen::Vector3d& center) {
   return EllipsoidFromAxes(center, Eigen::Vector3d::Constant(0.3), {0, 0, 0, 1});
 }
 
-TEST(RangeCost, ByHand) {  // 3 and 4 metres away make 5; measured 5.5 with a sigma of 0.25
+TEST(RangeCost, ByHand) {  // 3 and 4 meters away make 5; measured 5.5 with a sigma of 0.25
   const CostPointer cost(Cost::Create(5.5, 0.25));
   const std::vector<Block> blocks = {PoseBlock<Se2>({1, 2, 0.7}),
                                      LandmarkBlock(SphereAt({4, 6, 0}))};
@@ -36,7 +36,7 @@ TEST(RangeCost, JacobiansMatchPerturbation) {
   }
 }
 
-TEST(RangeCost, FailsAtTheCentre) {
+TEST(RangeCost, FailsAtTheCenter) {
   const CostPointer cost(Cost::Create(1.0, 0.1));
   EXPECT_FALSE(IsDefined(*cost, {PoseBlock<Se2>({1, 2, 0}), LandmarkBlock(SphereAt({1, 2, 0}))}));
 }

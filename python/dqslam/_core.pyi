@@ -48,7 +48,7 @@ __all__: list[str] = [
     "minus",
     "plus",
     "project_to_boxes",
-    "relocalise",
+    "relocalize",
     "solve",
     "world_from_camera",
 ]
@@ -152,28 +152,28 @@ class ScenePriors:
     @property
     def camera_height(self) -> float:
         """
-        Metres above the ground.
+        Meters above the ground.
         """
     @camera_height.setter
     def camera_height(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
     @property
     def camera_height_sigma(self) -> float:
         """
-        Metres.
+        Meters.
         """
     @camera_height_sigma.setter
     def camera_height_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
     @property
     def plane_offset(self) -> float:
         """
-        d of the ground n.x + d = 0, metres.
+        d of the ground n.x + d = 0, meters.
         """
     @plane_offset.setter
     def plane_offset(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
     @property
     def support_sigma(self) -> float:
         """
-        Each object stands on the ground: metres.
+        Each object stands on the ground: meters.
         """
     @support_sigma.setter
     def support_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
@@ -224,7 +224,7 @@ class Graph:
         scene_priors: ScenePriors = ...,
     ) -> None:
         """
-        Shapes, with d the size of a pose and k of its tangent: initial_poses (n, d); odometry (m, d), to_in_from, with covariance (m, k * k); boxes (b, 4) undistorted pixels with covariance (b, 16) and box_truncated (b, 4), edges cut by the image border; positions (p, 3) object_in_robot, metres, with covariance (p, 9); log_size_mean and log_size_sigma (o,), of semi-axes in log metres.
+        Shapes, with d the size of a pose and k of its tangent: initial_poses (n, d); odometry (m, d), to_in_from, with covariance (m, k * k); boxes (b, 4) undistorted pixels with covariance (b, 16) and box_truncated (b, 4), edges cut by the image border; positions (p, 3) object_in_robot, meters, with covariance (p, 9); log_size_mean and log_size_sigma (o,), of semi-axes in log meters.
         """
     @property
     def box_covariance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]: ...
@@ -344,7 +344,7 @@ class Backend(enum.Enum):
 
 class Minimizer(enum.Enum):
     """
-    The minimiser of the last stage.
+    The minimizer of the last stage.
     """
 
     DOGLEG = 1
@@ -516,7 +516,7 @@ class Summary:
     @property
     def linear_solver_seconds(self) -> float:
         """
-        Of all stages: orderings, factorisations and solutions.
+        Of all stages: orderings, factorizations and solutions.
         """
     @property
     def message(self) -> str:
@@ -676,7 +676,7 @@ class OnlineOptions:
     @property
     def lap_poses(self) -> int:
         """
-        Minimised rarely,
+        Minimized rarely,
         """
     @lap_poses.setter
     def lap_poses(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
@@ -725,7 +725,7 @@ class OnlineOptions:
     @property
     def recent_poses(self) -> int:
         """
-        Minimised now and then,
+        Minimized now and then,
         """
     @recent_poses.setter
     def recent_poses(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
@@ -753,7 +753,7 @@ class OnlineOptions:
     @property
     def tour_poses(self) -> int:
         """
-        Minimised by one such step,
+        Minimized by one such step,
         """
     @tour_poses.setter
     def tour_poses(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
@@ -767,7 +767,7 @@ class OnlineOptions:
     @property
     def window_poses(self) -> int:
         """
-        Minimised at every step.
+        Minimized at every step.
         """
     @window_poses.setter
     def window_poses(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
@@ -784,7 +784,7 @@ class StepReport:
     @property
     def closed_loop(self) -> bool: ...
     @property
-    def first_sight(self) -> int:
+    def first_observation(self) -> int:
         """
         Row of the first it saw: boxes as they were given, then positions.
         """
@@ -806,12 +806,12 @@ class StepReport:
     @property
     def smoothed_poses(self) -> int:
         """
-        Poses minimised beside the window; 0 at most steps.
+        Poses minimized beside the window; 0 at most steps.
         """
     @property
-    def smoothed_sights(self) -> int:
+    def smoothed_observations(self) -> int:
         """
-        Sights linearised there.
+        Sights linearized there.
         """
     @property
     def undefined(self) -> int:
@@ -916,7 +916,7 @@ class Session:
         begin: typing.SupportsInt | typing.SupportsIndex = 0,
     ) -> float:
         """
-        Minimise the poses from begin on, the map's priors included; returns the cost.
+        Minimize the poses from begin on, the map's priors included; returns the cost.
         """
     def to_graph(self) -> tuple[Graph, list[int]]:
         """
@@ -950,7 +950,7 @@ def axes_from_ellipsoid(
     typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 1]"],
 ]:
     """
-    Centre (3,), semi-axes (3,) descending [m], orientation x y z w (4,).
+    Center (3,), semi-axes (3,) descending [m], orientation x y z w (4,).
     """
 
 def between(
@@ -1005,7 +1005,7 @@ def ellipsoid_from_axes(
     orientation_xyzw: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 1]"],
 ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[9, 1]"]:
     """
-    Log-Cholesky parameters (9,) of a centre, semi-axes [m] and world_from_object rotation.
+    Log-Cholesky parameters (9,) of a center, semi-axes [m] and world_from_object rotation.
     """
 
 def ellipsoid_from_dual_quadric(
@@ -1062,7 +1062,7 @@ def project_to_boxes(
     Boxes (n, 4) of ellipsoid i from pose i [undistorted px], and whether it is strictly in front (n,); NaN where it is not.
     """
 
-def relocalise(
+def relocalize(
     pose_model: PoseModel,
     camera: Camera,
     ellipsoids: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],

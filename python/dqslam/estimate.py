@@ -37,7 +37,7 @@ class Estimate:
     dual_quadrics: Floats
     """q1 .. q9 with Q*(4,4) = 1, shape (o, 9)."""
     ellipsoids: Floats
-    """Centre and log-Cholesky shape, shape (o, 9); rows of NaN where q is no ellipsoid."""
+    """Center and log-Cholesky shape, shape (o, 9); rows of NaN where q is no ellipsoid."""
     inliers: Bools = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
     """Whether each box fits, chi-square at most `outlier_chi_square`; shape (b,)."""
     dropped: Mapping[int, str] = field(default_factory=dict)
@@ -45,12 +45,12 @@ class Estimate:
 
     @property
     def centers(self) -> Floats:
-        """Centres of the objects in the world, metres, shape (o, 3): (q4, q7, q9)."""
+        """Centers of the objects in the world, meters, shape (o, 3): (q4, q7, q9)."""
         return self.dual_quadrics[:, [3, 6, 8]]
 
     @property
     def shapes(self) -> Floats:
-        """Shapes S of the objects, square metres, (o, 3, 3); of any signature."""
+        """Shapes S of the objects, square meters, (o, 3, 3); of any signature."""
         return quadric_shapes(self.dual_quadrics)
 
     @property

@@ -1,8 +1,8 @@
 """What an estimator may see (Recording) and what it may not (Truth).
 
 Conventions are those of the core (blocks.h): SE(2) poses [x, y, theta], SE(3) poses
-[tx, ty, tz, qx, qy, qz, qw], metres, radians, pixels, seconds; boxes [u_min, v_min, u_max, v_max]
-with whole numbers at pixel centres. d is the pose size (3 or 7), k the tangent size (3 or 6).
+[tx, ty, tz, qx, qy, qz, qw], meters, radians, pixels, seconds; boxes [u_min, v_min, u_max, v_max]
+with whole numbers at pixel centers. d is the pose size (3 or 7), k the tangent size (3 or 6).
 Every array is copied, checked and made read-only; what is wrong is named by array and row.
 """
 
@@ -119,16 +119,16 @@ class Detections:
 
 @dataclass(frozen=True, eq=False)
 class RelativePositions:
-    """Measured centres of objects relative to the robot, as a depth camera gives them."""
+    """Measured centers of objects relative to the robot, as a depth camera gives them."""
 
     pose: Ints
     """Row of the pose it was seen from, shape (p,)."""
     object_id: Ints
     """Shape (p,)."""
     object_in_robot: Floats
-    """Metres, shape (p, 3)."""
+    """Meters, shape (p, 3)."""
     covariance: Floats
-    """Square metres, shape (p, 3, 3)."""
+    """Square meters, shape (p, 3, 3)."""
 
     def __post_init__(self) -> None:
         """Check shapes and numbers."""
@@ -216,13 +216,13 @@ class Truth:
     object_id: Ints
     """Of every object of the world, detected or not; shape (o,)."""
     center: Floats
-    """In the world, metres, shape (o, 3)."""
+    """In the world, meters, shape (o, 3)."""
     volume: Floats
-    """Cubic metres, shape (o,)."""
+    """Cubic meters, shape (o,)."""
     class_name: tuple[str, ...]
     """One per object."""
     ellipsoids: Floats | None = None
-    """Centre and log-Cholesky shape, shape (o, 9); None when the objects are no ellipsoids."""
+    """Center and log-Cholesky shape, shape (o, 9); None when the objects are no ellipsoids."""
     box_object_id: Ints | None = None
     """Which object each box of the recording shows, whatever its id says; shape (m,)."""
 

@@ -13,8 +13,8 @@ from dqslam import _core
 from dqslam._checks import Bools, Floats
 from dqslam._core import LandmarkModel, Mode, SolveOptions
 from dqslam.estimate import Estimate
-from dqslam.evaluate import true_rows
-from dqslam.problem import Graph
+from dqslam.graph import Graph
+from dqslam.metrics import true_rows
 from dqslam.recording import Truth
 
 _TABLES = (
@@ -45,13 +45,13 @@ class Marginals:
     poses: Floats
     """In the frame of each pose, translation [m] first, then rotation [rad]; (n, k, k)."""
     objects: Floats
-    """Of centre [m] and log-Cholesky shape, shape (o, 9, 9)."""
+    """Of center [m] and log-Cholesky shape, shape (o, 9, 9)."""
     under_constrained: tuple[str, ...]
     """A sentence for each pose (row) or object (id) that nothing determines, and why."""
 
     @property
     def centers(self) -> Floats:
-        """Covariances of the objects' centres in the world, m^2, shape (o, 3, 3)."""
+        """Covariances of the objects' centers in the world, m^2, shape (o, 3, 3)."""
         return self.objects[:, :3, :3]
 
 
@@ -62,7 +62,7 @@ class Bound:
     covariance: Marginals
     """At the truth."""
     position_error: float
-    """Expected mean distance of the poses from their true places (RMSE_pos), metres."""
+    """Expected mean distance of the poses from their true places (RMSE_pos), meters."""
 
 
 def marginal_covariances(

@@ -1,4 +1,4 @@
-#include "dqslam/block_cholesky.h"
+#include "dqslam/linear/block_cholesky.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "dqslam/block_matrix.h"
+#include "dqslam/linear/block_matrix.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "dqslam/block_matrix.h"
+#include "dqslam/linear/block_matrix.h"
 #include "random.h"
 
 namespace dqslam {

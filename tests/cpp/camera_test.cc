@@ -1,4 +1,4 @@
-#include "dqslam/camera.h"
+#include "dqslam/geometry/camera.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -96,7 +96,7 @@ TEST(UndistortBoxes, IsExactlyTheIdentityWithoutDistortion) {
 }
 
 TEST(LocateCamera, MountByHand) {
-  Camera camera = MakeCamera();  // half a metre ahead, turned left by 90 degrees on a robot ...
+  Camera camera = MakeCamera();  // half a meter ahead, turned left by 90 degrees on a robot ...
   camera.robot_from_camera << 0.5, 0, 0.2, 0, 0, std::sqrt(0.5), std::sqrt(0.5);
   const double pose[3] = {1, 2, M_PI / 2};  // ... that looks north from (1, 2)
   const CameraInWorld<double> located = LocateCamera<Se2>(pose, Mount(camera));

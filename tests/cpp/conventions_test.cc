@@ -1,8 +1,8 @@
 // One test for each line of the conventions in blocks.h.
 #include <gtest/gtest.h>
 
-#include "dqslam/blocks.h"
-#include "dqslam/ellipsoid.h"
+#include "dqslam/geometry/blocks.h"
+#include "dqslam/geometry/ellipsoid.h"
 #include "oracle.h"
 
 namespace dqslam {
@@ -109,7 +109,7 @@ TEST(Conventions, Se3TangentIsTranslationThenRotationInTheFrameOfThePose) {
   EXPECT_LT((world_from_robot.rotation - expected).norm(), 1e-15);
 }
 
-TEST(Conventions, EllipsoidIsCentreThenLogCholesky) {
+TEST(Conventions, EllipsoidIsCenterThenLogCholesky) {
   const double e[9] = {1, 2, 3, std::log(2.0), std::log(3.0), std::log(4.0), 0.1, 0.2, 0.3};
   Eigen::Matrix3d L;
   L << 2, 0, 0, 0.1, 3, 0, 0.2, 0.3, 4;

@@ -9,7 +9,7 @@
 #include <memory>
 #include <vector>
 
-#include "dqslam/manifolds.h"
+#include "dqslam/geometry/manifolds.h"
 
 namespace dqslam {
 

@@ -157,7 +157,7 @@ TYPED_TEST(BoxCosts, OneSidedEdgesCountOnlyWhereTheObjectEndsInside) {
   EXPECT_LT(beyond, 2 * kTrials - 5);
 }
 
-// Behind, around and across the camera: box and normalised algebraic refuse, the others do not.
+// Behind, around and across the camera: box and normalized algebraic refuse, the others do not.
 TYPED_TEST(BoxCosts, FailWhereTheirGeometryIsImpossible) {
   for (const double depth : {-5.0, -0.1, 0.0, 0.1}) {
     typename TestFixture::World world(this->random_);
@@ -179,7 +179,7 @@ TEST(TangentCost, FailsForADualQuadricWithoutARealSurface) {
   ExpectJacobiansMatchPerturbation(*world.Algebraic(kPlain, false), world.Blocks());
 }
 
-// Robot at (1, 2), driving along +y; the object three ahead and half a metre up.
+// Robot at (1, 2), driving along +y; the object three ahead and half a meter up.
 TEST(RelativePositionCost, ByHand) {
   const Eigen::Vector3d pose(1, 2, M_PI / 2), measured(3.1, -0.2, 0.4);
   const CostPointer cost(RelativePositionCost<Se2, EllipsoidModel>::Create(

@@ -1,9 +1,9 @@
-#include "dqslam/covariance.h"
+#include "dqslam/estimation/covariance.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "dqslam/solve.h"
+#include "dqslam/estimation/solve.h"
 #include "scene.h"
 
 namespace dqslam {
@@ -62,8 +62,8 @@ TEST(ComputeCovariance, PredictsTheSpreadOfEstimates) {
     for (int object = 0; object < scene.graph.num_objects(); ++object) {
       const Eigen::Vector3d error =
           (solution.landmarks.row(object) - scene.truth.landmarks.row(object)).head<3>();
-      const Eigen::Matrix3d centre = Square(covariance.objects, object).topLeftCorner<3, 3>();
-      nees += error.dot(centre.inverse() * error);
+      const Eigen::Matrix3d center = Square(covariance.objects, object).topLeftCorner<3, 3>();
+      nees += error.dot(center.inverse() * error);
     }
   }
   // Chi-square with 3 x 5 x 150 = 2250 degrees of freedom: 99.9 % within 10 % of its mean.

@@ -1,4 +1,4 @@
-#include "dqslam/dense_front.h"
+#include "dqslam/linear/dense_front.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "dqslam/elimination.h"
+#include "dqslam/linear/elimination.h"
 
 #include <gtest/gtest.h>
 

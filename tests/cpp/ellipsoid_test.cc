@@ -1,5 +1,5 @@
 // Conversions of ellipsoid.h; projection is in projection_test.cc.
-#include "dqslam/ellipsoid.h"
+#include "dqslam/geometry/ellipsoid.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "dqslam/front_tree.h"
+#include "dqslam/linear/front_tree.h"
 
 #include <gtest/gtest.h>
 
@@ -37,7 +37,7 @@ TEST(FrontTree, EliminatesEachBlockOnce) {
   }
 }
 
-// What makes a factorisation front by front right: every coupling is in the front of its first
+// What makes a factorization front by front right: every coupling is in the front of its first
 // pivot, and what a front updates is in its parent, which comes later.
 TEST(FrontTree, HoldsCouplingsAndUpdates) {
   for (const Pattern& pattern : Patterns()) {

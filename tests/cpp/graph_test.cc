@@ -1,4 +1,4 @@
-#include "dqslam/graph.h"
+#include "dqslam/problem/graph.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "dqslam/initialize.h"
+#include "dqslam/estimation/initialize.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,7 +10,7 @@ namespace dqslam {
 namespace {
 
 constexpr int kTrials = 10;
-constexpr double kSide = 5;  // metres from the camera to the object
+constexpr double kSide = 5;  // meters from the camera to the object
 
 Camera MakeCamera() {
   Camera camera;
@@ -66,7 +66,7 @@ std::vector<View> ConstantHeading(const oracle::Ellipsoid& ellipsoid, int count)
   return views;
 }
 
-/// Drives a circle around the origin; the level camera looks at its centre.
+/// Drives a circle around the origin; the level camera looks at its center.
 std::vector<View> Circle(const oracle::Ellipsoid& ellipsoid, double arc, int count) {
   std::vector<View> views;
   for (int i = 0; i < count; ++i) {
@@ -95,7 +95,7 @@ TEST(FitSvd, IsExactOnGeneralMotion) {
   }
 }
 
-// Far from the origin the planes' offsets dwarf their normals: hence the centring.
+// Far from the origin the planes' offsets dwarf their normals: hence the centering.
 TEST(FitSvd, IsExactFarFromTheOrigin) {
   Random random(2);
   const Eigen::Vector3d offset(1000, -2000, 50);
@@ -197,7 +197,7 @@ TEST(IdentityQuadric, IsTheIdentityMatrix) {
   EXPECT_EQ(DualQuadricMatrix(IdentityQuadric()), Eigen::Matrix4d(Eigen::Matrix4d::Identity()));
 }
 
-// Box of 70 x 65 px is 0.1 x 0.1 in normalised coordinates: a radius of 0.5 m fits at 10 m.
+// Box of 70 x 65 px is 0.1 x 0.1 in normalized coordinates: a radius of 0.5 m fits at 10 m.
 TEST(BackProject, DepthByHand) {
   View view;
   view.camera = {Eigen::Matrix3d::Identity(), {1, 2, 3}};

@@ -1,4 +1,4 @@
-#include "dqslam/least_squares.h"
+#include "dqslam/solver/least_squares.h"
 
 #include <ceres/crs_matrix.h>
 #include <ceres/problem.h>
@@ -6,8 +6,8 @@
 
 #include <Eigen/SparseCore>
 
-#include "dqslam/assembly.h"
-#include "dqslam/recover.h"
+#include "dqslam/estimation/repair.h"
+#include "dqslam/solver/assembly.h"
 #include "scene.h"
 
 namespace dqslam {
@@ -187,7 +187,7 @@ TYPED_TEST(LeastSquaresOf, AlongThePathIsPlusToFirstOrder) {
     const double h = half == 0 ? 1e-4 : 5e-5;
     Eigen::VectorXd straight, along_path;
     ASSERT_TRUE(problem->Plus(values, h * step, &straight));
-    ASSERT_TRUE(problem->PlusAlongPath(values, h * step, &along_path));
+    ASSERT_TRUE(problem->RetractAlongPath(values, h * step, &along_path));
     EXPECT_GT((straight - values).norm(), 1e-4);
     differences[half] = (along_path - straight).norm();
   }
@@ -204,7 +204,7 @@ TYPED_TEST(LeastSquaresOf, DualQuadricsDoNotGoAlongThePath) {
   const Eigen::VectorXd values = problem->Pack(this->state_);
   Eigen::VectorXd moved;
   const Eigen::VectorXd step = Eigen::VectorXd::Zero(problem->equations().H.rows());
-  EXPECT_FALSE(problem->PlusAlongPath(values, step, &moved));
+  EXPECT_FALSE(problem->RetractAlongPath(values, step, &moved));
 }
 
 TYPED_TEST(LeastSquaresOf, AnObjectBehindTheCameraHasNoCost) {

@@ -1,4 +1,4 @@
-#include "dqslam/manifolds.h"
+#include "dqslam/geometry/manifolds.h"
 
 #include <ceres/manifold_test_utils.h>
 

@@ -34,7 +34,7 @@ typename History<Pose>::Storage MakePose() {
 }
 
 Vector9d MakeChart(double distance) {
-  return ChartFromEllipsoid(EllipsoidFromAxes(
+  return CenterShapeFromEllipsoid(EllipsoidFromAxes(
       {-1, distance, 1.6}, {0.6, 0.4, 0.3}, Eigen::Vector4d(0.1, 0.2, 0.3, 0.9).normalized()));
 }
 
@@ -43,28 +43,30 @@ template <typename Pose>
 void ExpectDerivatives(double distance, bool is_box, bool truncated) {
   const Model model(MakeCamera(), ScenePriors(), 0);
   const auto pose = MakePose<Pose>();
-  const Vector9d chart = MakeChart(distance);
+  const Vector9d center_shape = MakeChart(distance);
   std::mt19937 random(3);
   std::normal_distribution<double> normal;
   for (int draw = 0; draw < 6; ++draw) {
-    Sight sight{};
-    sight.is_box = is_box;
-    sight.value << 250, 200, 380, 290;
-    if (!is_box) sight.value << 1, 2, 3, 0;
-    for (int i = 0; i < 4; ++i) sight.value[i] += (is_box ? 20 : 1) * normal(random);
-    if (!is_box) sight.value[3] = 0;
-    sight.sqrt_information = Eigen::Matrix4d::Identity() +
-                             0.3 * Eigen::Matrix4d::NullaryExpr([&] { return normal(random); });
-    if (truncated) sight.truncated << true, false, true, false;
+    Observation observation{};
+    observation.is_box = is_box;
+    observation.value << 250, 200, 380, 290;
+    if (!is_box) observation.value << 1, 2, 3, 0;
+    for (int i = 0; i < 4; ++i) observation.value[i] += (is_box ? 20 : 1) * normal(random);
+    if (!is_box) observation.value[3] = 0;
+    observation.sqrt_information =
+        Eigen::Matrix4d::Identity() +
+        0.3 * Eigen::Matrix4d::NullaryExpr([&] { return normal(random); });
+    if (truncated) observation.truncated << true, false, true, false;
     const auto station = [&](const typename History<Pose>::Storage& at) {
       return Station::At<Pose>(at.data(), model.mount);
     };
     Linear<Pose> linear;
-    Linearize<Pose>(model, station(pose), sight, chart, Edges::kBox, &linear);
+    Linearize<Pose>(model, station(pose), observation, center_shape, Edges::kBox, &linear);
     double unused;
-    EXPECT_NEAR(linear.cost,
-                CostOfSight(model, station(pose), sight, chart, linear.depth, &unused),
-                1e-9 * (1 + linear.cost));
+    EXPECT_NEAR(
+        linear.cost,
+        CostOfObservation(model, station(pose), observation, center_shape, linear.depth, &unused),
+        1e-9 * (1 + linear.cost));
     EXPECT_EQ(linear.depth > 0, is_box && distance < 2);
     const Eigen::VectorXd by_pose = linear.by_pose.transpose() * linear.residual;
     for (int i = 0; i < Pose::kTangentSize; ++i) {
@@ -75,17 +77,18 @@ void ExpectDerivatives(double distance, bool is_box, bool truncated) {
         tangent[i] = side == 0 ? -kStep : kStep;
         typename History<Pose>::Storage moved;
         Plus<Pose>(pose.data(), tangent.data(), moved.data());
-        cost[side] = CostOfSight(model, station(moved), sight, chart, linear.depth, &unused);
+        cost[side] = CostOfObservation(
+            model, station(moved), observation, center_shape, linear.depth, &unused);
       }
       EXPECT_NEAR(by_pose[i], (cost[1] - cost[0]) / (2 * kStep), 1e-4 * (1 + by_pose.norm()));
     }
     const Vector9d by_object = linear.by_object.transpose() * linear.residual;
     for (int i = 0; i < 9; ++i) {
       const Vector9d d = kStep * Vector9d::Unit(i);
-      const double ahead =
-          CostOfSight(model, station(pose), sight, chart + d, linear.depth, &unused);
-      const double behind =
-          CostOfSight(model, station(pose), sight, chart - d, linear.depth, &unused);
+      const double ahead = CostOfObservation(
+          model, station(pose), observation, center_shape + d, linear.depth, &unused);
+      const double behind = CostOfObservation(
+          model, station(pose), observation, center_shape - d, linear.depth, &unused);
       EXPECT_NEAR(by_object[i], (ahead - behind) / (2 * kStep), 1e-4 * (1 + by_object.norm()));
     }
   }
@@ -113,26 +116,30 @@ TEST(Linearize, PositionsInSpace) {
   ExpectDerivatives<Se3>(6, false, false);
 }
 
-// The residual is that of the cost which the batch minimises.
+// The residual is that of the cost which the batch minimizes.
 TEST(Linearize, IsTheBoxCost) {
   const Camera camera = MakeCamera();
   const Model model(camera, ScenePriors(), 0);
   const auto pose = MakePose<Se3>();
-  const Vector9d chart = MakeChart(6);
+  const Vector9d center_shape = MakeChart(6);
   Vector9d ellipsoid;
-  EllipsoidFromChart(chart.data(), ellipsoid.data());
-  Sight sight{};
-  sight.value << 250, 200, 380, 290;
-  sight.is_box = true;
-  sight.sqrt_information = Eigen::Vector4d(1, 2, 3, 4).asDiagonal();
-  sight.truncated.setConstant(false);
-  const BoxCost<Se3, EllipsoidModel> cost{
-      {}, camera, Mount(camera), sight.value, sight.sqrt_information, sight.truncated};
+  EllipsoidFromCenterShape(center_shape.data(), ellipsoid.data());
+  Observation observation{};
+  observation.value << 250, 200, 380, 290;
+  observation.is_box = true;
+  observation.sqrt_information = Eigen::Vector4d(1, 2, 3, 4).asDiagonal();
+  observation.truncated.setConstant(false);
+  const BoxCost<Se3, EllipsoidModel> cost{{},
+                                          camera,
+                                          Mount(camera),
+                                          observation.value,
+                                          observation.sqrt_information,
+                                          observation.truncated};
   Eigen::Vector4d expected;
   ASSERT_TRUE(cost(pose.data(), ellipsoid.data(), expected.data()));
   Linear<Se3> linear;
   const Station station = Station::At<Se3>(pose.data(), model.mount);
-  Linearize<Se3>(model, station, sight, chart, Edges::kBox, &linear);
+  Linearize<Se3>(model, station, observation, center_shape, Edges::kBox, &linear);
   EXPECT_LT((linear.residual - expected).norm(), 1e-9);
 }
 
@@ -140,16 +147,16 @@ TEST(Linearize, IsTheBoxCost) {
 TEST(Linearize, WeighsByTheCauchyLoss) {
   const Model plain(MakeCamera(), ScenePriors(), 0), robust(MakeCamera(), ScenePriors(), 2);
   const auto pose = MakePose<Se2>();
-  const Vector9d chart = MakeChart(6);
-  Sight sight{};
-  sight.is_box = true;
-  sight.value << 250, 200, 380, 290;
-  sight.sqrt_information.setIdentity();
-  sight.truncated.setConstant(false);
+  const Vector9d center_shape = MakeChart(6);
+  Observation observation{};
+  observation.is_box = true;
+  observation.value << 250, 200, 380, 290;
+  observation.sqrt_information.setIdentity();
+  observation.truncated.setConstant(false);
   Linear<Se2> all, weighed;
   const Station station = Station::At<Se2>(pose.data(), plain.mount);
-  Linearize<Se2>(plain, station, sight, chart, Edges::kBox, &all);
-  Linearize<Se2>(robust, station, sight, chart, Edges::kBox, &weighed);
+  Linearize<Se2>(plain, station, observation, center_shape, Edges::kBox, &all);
+  Linearize<Se2>(robust, station, observation, center_shape, Edges::kBox, &weighed);
   const double s = all.residual.squaredNorm();
   EXPECT_NEAR(weighed.cost, 0.5 * 4 * std::log1p(s / 4), 1e-9);
   const Vector9d expected = all.by_object.transpose() * all.residual / (1 + s / 4);
@@ -159,21 +166,21 @@ TEST(Linearize, WeighsByTheCauchyLoss) {
 
 TEST(Chart, ThereAndBack) {
   Vector9d ellipsoid;
-  const Vector9d chart = MakeChart(6);
-  EllipsoidFromChart(chart.data(), ellipsoid.data());
-  EXPECT_LT((ChartFromEllipsoid(ellipsoid) - chart).norm(), 1e-12);
+  const Vector9d center_shape = MakeChart(6);
+  EllipsoidFromCenterShape(center_shape.data(), ellipsoid.data());
+  EXPECT_LT((CenterShapeFromEllipsoid(ellipsoid) - center_shape).norm(), 1e-12);
 }
 
 TEST(Chart, MovesInAStraightLineWhileItCan) {
-  const Vector9d chart = MakeChart(6);
+  const Vector9d center_shape = MakeChart(6);
   Vector9d moved;
   const Vector9d small = 1e-3 * Vector9d::Ones();
-  ASSERT_TRUE(Move(chart, small, &moved));
-  EXPECT_LT((moved - chart - small).norm(), 1e-9);
+  ASSERT_TRUE(Move(center_shape, small, &moved));
+  EXPECT_LT((moved - center_shape - small).norm(), 1e-9);
   // Far beyond the cone of ellipsoids it bends, and stays one.
   Vector9d large = Vector9d::Zero();
   large[3] = -5;
-  ASSERT_TRUE(Move(chart, large, &moved));
+  ASSERT_TRUE(Move(center_shape, large, &moved));
   EXPECT_GT(ShapeOf(moved.data()).determinant(), 0);
 }
 
@@ -182,16 +189,16 @@ TEST(Priors, OfASphere) {
   const Model model(MakeCamera(), ScenePriors(), 0);
   Object object;
   object.size = {std::log(0.3), 0.5};
-  const Vector9d chart = ChartFromEllipsoid(Sphere({1, 2, 3}, 0.6));
+  const Vector9d center_shape = CenterShapeFromEllipsoid(Sphere({1, 2, 3}, 0.6));
   const double expected = 0.5 * 3 * std::pow(std::log(2) / 0.5, 2);
-  EXPECT_NEAR(CostOfPriors(model, object, chart), expected, 1e-9);
-  Quadratic sum;
-  EXPECT_NEAR(AddPriors(model, object, chart, &sum), expected, 1e-9);
+  EXPECT_NEAR(CostOfPriors(model, object, center_shape), expected, 1e-9);
+  GaussianPrior sum;
+  EXPECT_NEAR(AddPriors(model, object, center_shape, &sum), expected, 1e-9);
   for (int i = 0; i < 9; ++i) {
     const Vector9d d = kStep * Vector9d::Unit(i);
-    const double slope =
-        (CostOfPriors(model, object, chart + d) - CostOfPriors(model, object, chart - d)) /
-        (2 * kStep);
+    const double slope = (CostOfPriors(model, object, center_shape + d) -
+                          CostOfPriors(model, object, center_shape - d)) /
+                         (2 * kStep);
     EXPECT_NEAR(sum.g[i], slope, 1e-5);
   }
 }

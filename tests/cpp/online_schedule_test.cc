@@ -45,7 +45,7 @@ TEST(Schedule, LapsAndToursOfALongSession) {
   EXPECT_GE(recent, 3456 / 16 - 27);
 }
 
-// A young session minimises all of itself whenever it has grown by a quarter, at first each 16.
+// A young session minimizes all of itself whenever it has grown by a quarter, at first each 16.
 TEST(Schedule, LapsOfAYoungSession) {
   Schedule schedule{OnlineOptions()};
   std::vector<int> laps;

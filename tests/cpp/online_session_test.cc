@@ -52,7 +52,7 @@ class SessionTest : public testing::Test {
   }
 
   // Adds a pose; the boxes that `waits` names have no object yet, those that `given` does not name
-  // are not there at all.  Rows of sights are those of the boxes while all are given.
+  // are not there at all.  Rows of observations are those of the boxes while all are given.
   template <typename Waits, typename Given>
   StepReport Add(Session* session, int pose, Waits&& waits, Given&& given) {
     std::vector<int> rows, objects;
@@ -65,21 +65,21 @@ class SessionTest : public testing::Test {
       objects.push_back(waits(row) ? -1 : own);
     }
     const int n = static_cast<int>(rows.size());
-    NewSights sights;
-    sights.object = Eigen::Map<const IndexVector>(objects.data(), n);
-    sights.box.resize(n, 4);
-    sights.covariance.resize(n, 16);
-    sights.truncated = BoolTable::Constant(n, 4, false);
+    StepObservations observations;
+    observations.object = Eigen::Map<const IndexVector>(objects.data(), n);
+    observations.box.resize(n, 4);
+    observations.covariance.resize(n, 16);
+    observations.truncated = BoolTable::Constant(n, 4, false);
     for (int i = 0; i < n; ++i) {
-      sights.box.row(i) = scene_.graph.boxes.box.row(rows[i]);
-      sights.covariance.row(i) = scene_.graph.boxes.covariance.row(rows[i]);
+      observations.box.row(i) = scene_.graph.boxes.box.row(rows[i]);
+      observations.covariance.row(i) = scene_.graph.boxes.covariance.row(rows[i]);
     }
-    sights.log_size_mean = Eigen::VectorXd::Constant(born, std::log(0.3));
-    sights.log_size_sigma = Eigen::VectorXd::Constant(born, kSizeSigma);
-    if (pose == 0) return session->Add(scene_.truth.poses.row(0), RowMatrix(), sights);
+    observations.log_size_mean = Eigen::VectorXd::Constant(born, std::log(0.3));
+    observations.log_size_sigma = Eigen::VectorXd::Constant(born, kSizeSigma);
+    if (pose == 0) return session->Add(scene_.truth.poses.row(0), RowMatrix(), observations);
     const RowMatrix covariance =
         scene_.graph.odometry.covariance.row(pose - 1).reshaped(k, k).eval();
-    return session->Add(scene_.graph.odometry.relative.row(pose - 1), covariance, sights);
+    return session->Add(scene_.graph.odometry.relative.row(pose - 1), covariance, observations);
   }
 
   template <typename Waits>
@@ -91,9 +91,9 @@ class SessionTest : public testing::Test {
     return session;
   }
 
-  // One new object, from the truth but for a metre.
-  NewLabels NewObject(const std::vector<int>& sights, int row, int object) const {
-    NewLabels labels = Labels(sights, row);
+  // One new object, from the truth but for a meter.
+  NewLabels NewObject(const std::vector<int>& observations, int row, int object) const {
+    NewLabels labels = Labels(observations, row);
     labels.ellipsoid = scene_.truth.landmarks.row(object);
     labels.ellipsoid(0, 0) += 0.2;
     labels.log_size_mean = Eigen::VectorXd::Constant(1, std::log(0.3));
@@ -101,10 +101,10 @@ class SessionTest : public testing::Test {
     return labels;
   }
 
-  static NewLabels Labels(const std::vector<int>& sights, int row) {
+  static NewLabels Labels(const std::vector<int>& observations, int row) {
     NewLabels labels;
-    labels.sight = Eigen::Map<const IndexVector>(sights.data(), sights.size());
-    labels.object = IndexVector::Constant(sights.size(), row);
+    labels.observation = Eigen::Map<const IndexVector>(observations.data(), observations.size());
+    labels.object = IndexVector::Constant(observations.size(), row);
     return labels;
   }
 
@@ -129,14 +129,14 @@ TYPED_TEST(SessionTest, BoxesThatWaitTakeNoPart) {
   auto without = this->Begin(), with = this->Begin();
   const std::vector<int> nothing = this->row_;
   std::vector<int> rows = nothing;
-  int first_sight = 0;
+  int first_observation = 0;
   for (int pose = 0; pose < this->scene_.truth.poses.rows(); ++pose) {
     this->row_ = rows;
     this->Add(without.get(), pose, kNone, [&](int row) { return !waits(row); });
     this->row_ = rows;
-    EXPECT_EQ(this->Add(with.get(), pose, waits, kAll).first_sight, first_sight);
+    EXPECT_EQ(this->Add(with.get(), pose, waits, kAll).first_observation, first_observation);
     rows = this->row_;
-    for (int row = 0; row < this->boxes(); ++row) first_sight += this->PoseOf(row) == pose;
+    for (int row = 0; row < this->boxes(); ++row) first_observation += this->PoseOf(row) == pose;
     ASSERT_EQ(with->Poses(), without->Poses()) << pose;
     ASSERT_EQ(with->Ellipsoids(), without->Ellipsoids()) << pose;
   }
@@ -209,12 +209,12 @@ TYPED_TEST(SessionTest, GoesOnWithTheNewLabels) {
     rows = this->row_;
     if (pose != told) continue;
     NewLabels labels;
-    std::vector<int> sights, objects;
+    std::vector<int> observations, objects;
     for (int row = 20; row < this->boxes() && this->PoseOf(row) < told; row += 4) {
-      sights.push_back(row);
+      observations.push_back(row);
       objects.push_back(rows[this->ObjectOf(row)]);
     }
-    labels.sight = Eigen::Map<const IndexVector>(sights.data(), sights.size());
+    labels.observation = Eigen::Map<const IndexVector>(observations.data(), observations.size());
     labels.object = Eigen::Map<const IndexVector>(objects.data(), objects.size());
     late->Relabel(labels);
     // Both stand at the same minimum from here on.
@@ -251,9 +251,10 @@ TYPED_TEST(SessionTest, WrongLabelsChangeNothing) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const auto good = [&] { return this->NewObject({0, 4, 8}, 5, 2); };
   std::vector<std::pair<NewLabels, std::string>> wrong(11, {good(), ""});
-  wrong[0].first.sight[1] = this->boxes(), wrong[0].second = "sight row 1: no such sight";
-  wrong[1].first.sight[2] = -1, wrong[1].second = "sight row 2: no such sight";
-  wrong[2].first.sight[2] = 0, wrong[2].second = "sight row 2: repeats row 0";
+  wrong[0].first.observation[1] = this->boxes(),
+  wrong[0].second = "observation row 1: no such observation";
+  wrong[1].first.observation[2] = -1, wrong[1].second = "observation row 2: no such observation";
+  wrong[2].first.observation[2] = 0, wrong[2].second = "observation row 2: repeats row 0";
   wrong[3].first.object[1] = 6, wrong[3].second = "object row 1: no such object";
   wrong[4].first.object[0] = -2, wrong[4].second = "object row 0: no such object";
   wrong[5].first.object.setConstant(-1);
@@ -262,7 +263,7 @@ TYPED_TEST(SessionTest, WrongLabelsChangeNothing) {
   wrong[7].first.ellipsoid(0, 3) = 800, wrong[7].second = "ellipsoid row 0: not a finite ellipsoid";
   wrong[8].first.log_size_sigma[0] = 0, wrong[8].second = "log_size_sigma row 0";
   wrong[9].first.ellipsoid.resize(2, 9), wrong[9].second = "ellipsoid: expected 1 rows of 9";
-  wrong[10].first.object.resize(2), wrong[10].second = "object: expected one for each sight";
+  wrong[10].first.object.resize(2), wrong[10].second = "object: expected one for each observation";
   const RowMatrix poses = session->Poses(), ellipsoids = session->Ellipsoids();
   const IndexVector observations = session->Observations();
   const double cost = session->Clone()->Smooth(5, 0);
@@ -286,21 +287,21 @@ TYPED_TEST(SessionTest, WrongLabelsChangeNothing) {
 TYPED_TEST(SessionTest, PositionsKeepTheirObject) {
   const auto session = this->Begin();
   this->Add(session.get(), 0, kNone, kAll);
-  NewSights sights;
-  sights.box.resize(0, 4);
-  sights.position_object = IndexVector::Zero(1);
-  sights.position = RowMatrix::Constant(1, 3, 1);
-  sights.position_covariance = Eigen::Matrix3d::Identity().reshaped().transpose();
+  StepObservations observations;
+  observations.box.resize(0, 4);
+  observations.position_object = IndexVector::Zero(1);
+  observations.position = RowMatrix::Constant(1, 3, 1);
+  observations.position_covariance = Eigen::Matrix3d::Identity().reshaped().transpose();
   constexpr int k = TypeParam::kTangentSize;
   const Eigen::VectorXd step = this->scene_.graph.odometry.relative.row(0);
-  const int row = session->Add(step, RowMatrix::Identity(k, k), sights).first_sight;
+  const int row = session->Add(step, RowMatrix::Identity(k, k), observations).first_observation;
   EXPECT_THROW(session->Relabel(this->Labels({row}, -1)), std::invalid_argument);
-  sights.position_object[0] = -1;
-  EXPECT_THROW(session->Add(step, RowMatrix::Identity(k, k), sights), std::invalid_argument);
+  observations.position_object[0] = -1;
+  EXPECT_THROW(session->Add(step, RowMatrix::Identity(k, k), observations), std::invalid_argument);
   EXPECT_EQ(session->num_poses(), 2);
 }
 
-// The objects are out of sight for half of the drive, and only later told to be the same.
+// The objects are out of observation for half of the drive, and only later told to be the same.
 TYPED_TEST(SessionTest, ALoopThatIsToldLateIsClosed) {
   for (const double drift : {0.0, 0.02}) {
     this->scene_ = MakeScene<TypeParam>();
@@ -309,7 +310,7 @@ TYPED_TEST(SessionTest, ALoopThatIsToldLateIsClosed) {
     options.loop_absence = 15;
     auto session = this->Begin(options);
     std::vector<int> late;
-    int sights = 0, closed = 0, smoothed = 0;
+    int observations = 0, closed = 0, smoothed = 0;
     for (int pose = 0; pose < 40; ++pose) {
       const auto given = [&](int row) { return this->PoseOf(row) < 10 || this->PoseOf(row) >= 30; };
       const auto waits = [&](int row) { return this->PoseOf(row) >= 30; };
@@ -318,8 +319,9 @@ TYPED_TEST(SessionTest, ALoopThatIsToldLateIsClosed) {
       if (report.closed_loop) smoothed = report.smoothed_poses;
       for (int row = 0; row < this->boxes(); ++row) {
         if (this->PoseOf(row) != pose || !given(row)) continue;
-        if (waits(row) && pose < 35 && this->row_[this->ObjectOf(row)] >= 0) late.push_back(sights);
-        ++sights;
+        if (waits(row) && pose < 35 && this->row_[this->ObjectOf(row)] >= 0)
+          late.push_back(observations);
+        ++observations;
       }
       if (pose == 34) {
         EXPECT_EQ(closed, 0);

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "dqslam/camera.h"
+#include "dqslam/geometry/camera.h"
 
 namespace dqslam::oracle {
 
@@ -22,7 +22,7 @@ inline Eigen::Matrix3d RotationMatrix(const Eigen::Vector4d& q) {
 
 struct Ellipsoid {
   Eigen::Vector3d center;
-  Eigen::Vector3d semi_axes;         ///< metres
+  Eigen::Vector3d semi_axes;         ///< meters
   Eigen::Vector4d orientation_xyzw;  ///< world_from_object
 
   /// Surface point in the direction d of the unit sphere.

@@ -1,8 +1,8 @@
-#include "dqslam/path_step.h"
+#include "dqslam/solver/path_step.h"
 
 #include <gtest/gtest.h>
 
-#include "dqslam/manifolds.h"
+#include "dqslam/geometry/manifolds.h"
 #include "random.h"
 
 namespace dqslam {
@@ -70,7 +70,7 @@ class PathStep : public testing::Test {
 using PoseTypes = testing::Types<Se2, Se3>;
 TYPED_TEST_SUITE(PathStep, PoseTypes);
 
-// By a radian, which tangents alone miss by half a metre.
+// By a radian, which tangents alone miss by half a meter.
 TYPED_TEST(PathStep, ATurnOfEverythingIsExact) {
   constexpr double kAngle = 1;
   const PoseVector<TypeParam> turn = Turn<TypeParam>(kAngle);

@@ -1,4 +1,4 @@
-#include "dqslam/pose.h"
+#include "dqslam/geometry/pose.h"
 
 #include <ceres/jet.h>
 #include <gtest/gtest.h>

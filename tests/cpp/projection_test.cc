@@ -1,7 +1,7 @@
 // Projection, tangent distances and visibility of ellipsoid.h.
 #include <gtest/gtest.h>
 
-#include "dqslam/ellipsoid.h"
+#include "dqslam/geometry/ellipsoid.h"
 #include "oracle.h"
 #include "random.h"
 
@@ -125,7 +125,7 @@ TEST(TangentDistances, ArePositiveWhereTheObjectSticksOut) {
   }
 }
 
-// Plane x = z through the centre of the camera; ball of radius 1 at (3, 0, 1): n = (1, 0, -1),
+// Plane x = z through the center of the camera; ball of radius 1 at (3, 0, 1): n = (1, 0, -1),
 // n.p = 2, |n| = sqrt 2.  Behind the camera, beside it and around it the same formula holds.
 TEST(TangentDistances, ByHandEverywhere) {
   const Camera camera = MakeCamera();
@@ -154,7 +154,7 @@ TEST(TangentDistances, FailWithoutARealSurface) {
                                 &distances));
 }
 
-TEST(TangentDepth, IsThatOfTheCentreButNeverLessThanTheObjectIsThick) {
+TEST(TangentDepth, IsThatOfTheCenterButNeverLessThanTheObjectIsThick) {
   const Eigen::Matrix3d shape = Eigen::Vector3d(1, 1, 0.04).asDiagonal();
   EXPECT_DOUBLE_EQ(TangentDepth({{1, 2, 5}, shape}), 5);
   EXPECT_DOUBLE_EQ(TangentDepth({{1, 2, 0.1}, shape}), 0.3);

@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 #include <random>
 
-#include "dqslam/pose.h"
+#include "dqslam/geometry/pose.h"
 
 namespace dqslam {
 

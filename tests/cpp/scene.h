@@ -4,8 +4,8 @@
 
 #include <vector>
 
-#include "dqslam/ellipsoid.h"
-#include "dqslam/graph.h"
+#include "dqslam/geometry/ellipsoid.h"
+#include "dqslam/problem/graph.h"
 #include "oracle.h"
 #include "random.h"
 

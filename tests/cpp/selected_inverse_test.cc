@@ -1,4 +1,4 @@
-#include "dqslam/selected_inverse.h"
+#include "dqslam/linear/selected_inverse.h"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@ namespace {
 
 using Sparse = Eigen::SparseMatrix<double>;
 
-// A chain of blocks, each tied to its neighbour, and one block tied to all: an arrowhead.
+// A chain of blocks, each tied to its neighbor, and one block tied to all: an arrowhead.
 Sparse ChainWithLandmark(const std::vector<int>& sizes, Random& random) {
   int rows = 0;
   for (const int size : sizes) rows += size;

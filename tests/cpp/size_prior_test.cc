@@ -76,7 +76,7 @@ TEST(SizePriorCost, JacobianMatchesPerturbationForEqualAxes) {
   }
 }
 
-TEST(SizePriorCost, DoesNotPullTheCentre) {
+TEST(SizePriorCost, DoesNotPullTheCenter) {
   Random random(5);
   const Eigen::MatrixXd jacobian =
       AutoDiffJacobian(*Prior(), Object({0.3, 0.5, 0.9}, random.UnitQuaternion()), 0);

@@ -7,7 +7,7 @@
 #include <string>
 #include <utility>
 
-#include "dqslam/solve.h"
+#include "dqslam/estimation/solve.h"
 #include "scene.h"
 
 namespace dqslam {

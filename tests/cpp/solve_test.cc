@@ -1,4 +1,4 @@
-#include "dqslam/solve.h"
+#include "dqslam/estimation/solve.h"
 
 #include <gtest/gtest.h>
 
@@ -75,7 +75,7 @@ TYPED_TEST(SolveOf, RecoversTheTruthByDefault) {
   EXPECT_GT(solution.summary.initial_cost, 1);
 }
 
-// Only the initial poses are wrong, by metres at the end of the loop; every start and minimiser.
+// Only the initial poses are wrong, by meters at the end of the loop; every start and minimizer.
 TYPED_TEST(SolveOf, RecoversTheTruthFromDriftedInitialPoses) {
   Graph graph = this->scene_.graph;
   graph.initial_poses = Drift<TypeParam>(graph.odometry.relative, this->scene_.truth.poses, 0.05);
@@ -122,7 +122,7 @@ TYPED_TEST(SolveOf, MappingRecoversObjectsAndLeavesPoses) {
       this->options_.landmark_model = model;
       this->options_.residual = residual;
       const Solution solution = Solve(graph, this->options_, {});
-      // Up to the rounding that normalises quaternions.
+      // Up to the rounding that normalizes quaternions.
       EXPECT_LT((solution.poses - this->scene_.truth.poses).cwiseAbs().maxCoeff(), 1e-15);
       this->ExpectTruth(solution);
     }

@@ -3,7 +3,7 @@
 #include "cost_checks.h"
 #include "dqslam/costs/box.h"
 #include "dqslam/costs/tangent.h"
-#include "dqslam/solve.h"
+#include "dqslam/estimation/solve.h"
 #include "scene.h"
 
 namespace dqslam {
@@ -87,16 +87,16 @@ TEST(TruncatedBoxes, DoNotPullObjects) {
     // border.
   }
   EXPECT_GT(truncated, cut.size() / 10);
-  const auto centre_error = [&] {
+  const auto center_error = [&] {
     SolveOptions options;
     options.mode = Mode::kMapping;
     const Solution solution = Solve(scene.graph, options, {});
     return (solution.landmarks - scene.truth.landmarks).leftCols<3>().rowwise().norm().maxCoeff();
   };
   boxes = cut;
-  EXPECT_LT(centre_error(), 1e-3);
+  EXPECT_LT(center_error(), 1e-3);
   boxes.truncated.setConstant(false);
-  EXPECT_GT(centre_error(), 1e-2);
+  EXPECT_GT(center_error(), 1e-2);
 }
 
 }  // namespace

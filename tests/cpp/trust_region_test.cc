@@ -1,12 +1,12 @@
-#include "dqslam/trust_region.h"
+#include "dqslam/solver/trust_region.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "dqslam/recover.h"
-#include "dqslam/solve.h"
+#include "dqslam/estimation/repair.h"
+#include "dqslam/estimation/solve.h"
 #include "scene.h"
 
 namespace dqslam {
@@ -24,9 +24,9 @@ class Rosenbrock : public LeastSquares {
     *moved = values + step;
     return true;
   }
-  bool PlusAlongPath(const Eigen::VectorXd&,
-                     const Eigen::VectorXd&,
-                     Eigen::VectorXd*) const override {
+  bool RetractAlongPath(const Eigen::VectorXd&,
+                        const Eigen::VectorXd&,
+                        Eigen::VectorXd*) const override {
     return false;
   }
   bool Cost(const Eigen::VectorXd& v, double* cost) const override {

@@ -1,4 +1,4 @@
-#include "dqslam/whitening.h"
+#include "dqslam/costs/whitening.h"
 
 #include <gtest/gtest.h>
 

@@ -15,7 +15,7 @@ NAMES = {1: "cup", 2: "book", 5: "lamp", 9: "box"}
 
 @dataclass
 class Orbit:
-    """Truth: poses (n, 7) world_from_camera at times (n,), centres (o, 3), boxes by pose, id."""
+    """Truth: poses (n, 7) world_from_camera at times (n,), centers (o, 3), boxes by pose, id."""
 
     times: np.ndarray
     poses: np.ndarray

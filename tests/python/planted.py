@@ -27,7 +27,7 @@ CLASSES = ("cup", "book", "lamp", "box", "box", "cup")
 POSES = 20
 
 # What is planted in the estimate.
-CENTER_ERROR = 0.02  # metres, object 10
+CENTER_ERROR = 0.02  # meters, object 10
 SIZE_FACTOR = 1.1  # object 11
 ANGLE = 10.0  # degrees about the longest axis, object 12; 13 is not mapped; 14 moves
 

@@ -10,9 +10,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from dqslam import Camera, Detections, Odometry, PoseModel, Recording, _core
-from dqslam.associate.scene_map import SceneMap
-from dqslam.io import OdometryNoise
-from dqslam.problem import BoxNoise
+from dqslam.association.scene_map import SceneMap
+from dqslam.assumptions import BoxNoise, OdometryNoise
 from orbit import looking_at_origin
 
 CAMERA = Camera(500.0, 510.0, 321.0, 239.0, 640, 480)
@@ -24,11 +23,11 @@ class Thing:
     """An ellipsoid."""
 
     center: np.ndarray
-    """Metres, at the first pose, shape (3,)."""
+    """Meters, at the first pose, shape (3,)."""
     semi_axes: np.ndarray
     class_id: int = 1
     path: np.ndarray | None = None
-    """Centre at each pose (n, 3), of what moves."""
+    """Center at each pose (n, 3), of what moves."""
     turn: np.ndarray = field(default_factory=lambda: np.eye(3))
 
     def at(self, pose):
@@ -52,7 +51,7 @@ class Film:
         return replace(self.recording, detections=replace(self.recording.detections, object_id=ids))
 
     def ate(self, poses):
-        """Return the root mean square distance of positions, first pose fixed, metres."""
+        """Return the root mean square distance of positions, first pose fixed, meters."""
         return float(np.sqrt(np.mean(np.sum((poses - self.poses)[:, :3] ** 2, axis=1))))
 
     @property

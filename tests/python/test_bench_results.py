@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 from benchmarks import compare, report
 from benchmarks.figure import plot_scaling, scaling_cases
-from benchmarks.linearise import read_google_benchmark
+from benchmarks.linearize import read_google_benchmark
 from benchmarks.results import Measured, Run, load_results, save_results
 
 from bench import TRUE_ANSWER, cells, measured, results
@@ -68,7 +68,7 @@ def test_split_is_shown_where_it_is_told():
 
 def test_answer_table_by_hand():
     table = report.answer_table(results(measured("paper", "dqslam", [2.0])))
-    headings = ("boxes", "RMSE m", "aligned m", "centres m", "boxes px", "impossible", "cost")
+    headings = ("boxes", "RMSE m", "aligned m", "centers m", "boxes px", "impossible", "cost")
     assert [cells(table, heading)[0] for heading in headings] == [
         *("100", "0.1", "0.02", "0.05", "1", "0", "7"),
     ]
@@ -111,7 +111,7 @@ def test_google_benchmark_by_hand():
     ]
     (found,) = read_google_benchmark(json.dumps({"benchmarks": rows}))
     assert (found.name, found.cpu_ns) == ("box/se2", (pytest.approx(700.0), 800.0))
-    assert cells(report.linearised_table([found]), "CPU ns (least, greatest)") == ["750 (700, 800)"]
+    assert cells(report.linearized_table([found]), "CPU ns (least, greatest)") == ["750 (700, 800)"]
 
 
 def test_figure_has_the_chains_by_size(tmp_path):

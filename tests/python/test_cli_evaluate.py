@@ -65,13 +65,13 @@ def test_the_documentation_has_every_key(files):
 
 
 def test_json_is_the_file(files, capsys):
-    assert call(files, "--json", "--rpe-delta", 0.5, "--rpe-unit", "metres") == 0
+    assert call(files, "--json", "--rpe-delta", 0.5, "--rpe-unit", "meters") == 0
     shown = capsys.readouterr()
     assert shown.out == (files.results / "evaluation.json").read_text()
     content = json.loads(shown.out)
     assert content["objects"] is None
     assert content["association"] is None
-    assert (content["rpe"]["delta"], content["rpe"]["unit"]) == (0.5, "metres")
+    assert (content["rpe"]["delta"], content["rpe"]["unit"]) == (0.5, "meters")
 
 
 def test_without_boxes_it_says_so(files, capsys):

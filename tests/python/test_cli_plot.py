@@ -9,8 +9,8 @@ from PIL import Image
 import planted
 import realdata
 from dqslam.cli import main
-from dqslam.evaluate import up_direction
 from dqslam.io import load_results
+from dqslam.metrics import up_direction
 
 FIGURES = ["boxes", "map", "position_error", "residuals", "rotation_error"]
 SIZE = (planted.CAMERA.width, planted.CAMERA.height)

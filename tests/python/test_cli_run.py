@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from console import assert_one_line_of_error
+from dqslam.assumptions import OdometryNoise
 from dqslam.cli import main
 from dqslam.cli.run import parse_noise
-from dqslam.io import OdometryNoise, read_trajectory
+from dqslam.io import read_trajectory
 from orbit import NAMES
 
 PERTURB = ("--perturb-odometry", "translation=0.01,rotation=0.01")

@@ -133,7 +133,7 @@ def test_the_site_is_built_without_a_warning(tmp_path):
     assert len(re.findall("<math ", (site / "method.html").read_text())) > 20
     assert "this build" in (site / "paper_experiment.html").read_text()
     assert (site / "_images/paper_maps.png").is_file()
-    assert (site / "_generated/source/cpp/dqslam/blocks.h.html").is_file()
+    assert (site / "_generated/source/cpp/dqslam/geometry/blocks.h.html").is_file()
     for page in site.glob("*.html"):  # nothing is fetched from elsewhere
         fetched = r'<(?:script|img|iframe)[^>]* src="https?://|<link[^>]* href="https?://'
         assert not re.findall(fetched, page.read_text()), page.name

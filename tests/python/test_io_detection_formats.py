@@ -75,7 +75,7 @@ def test_yolo_by_hand(tmp_path):
     write(tmp_path, "labels/000006.txt", "")
     write(tmp_path, "labels/classes.txt", "person\n\n\ncup\n")
     table = read(tmp_path / "labels")
-    # Centre 320, 240 from the corner of the image, 160 x 240 px.
+    # Center 320, 240 from the corner of the image, 160 x 240 px.
     np.testing.assert_array_equal(table.box[0], [239.5, 119.5, 399.5, 359.5])
     np.testing.assert_array_equal(table.box[2], [-0.5, -0.5, 639.5, 479.5])
     assert (table.frame.tolist(), table.line.tolist()) == ([2, 2, 5], [1, 2, 1])

@@ -18,7 +18,7 @@ def test_our_own_columns(tmp_path):
     path = write(
         tmp_path,
         "# a comment\n"
-        "class_name,x,y,z,qx,qy,qz,qw,sx,sy,sz,static,object_id,colour\n"
+        "class_name,x,y,z,qx,qy,qz,qw,sx,sy,sz,static,object_id,color\n"
         f"cup,1,2,3,0,0,{HALF:.4f},{HALF:.4f},0.1,0.2,0.3,1,7,red\n"
         '"box, big",4,5,6,0,0,0,1,1,2,3,0,9,blue\n',
     )
@@ -32,7 +32,7 @@ def test_our_own_columns(tmp_path):
     np.testing.assert_array_equal(found.static, [True, False])
 
 
-def test_centres_are_enough(tmp_path):
+def test_centers_are_enough(tmp_path):
     found = read_true_objects(write(tmp_path, "x,y,z\n1,2,3\n"))
     assert (found.id, found.class_name, found.rotation, found.size) == (None,) * 4
     np.testing.assert_array_equal(found.static, [True])

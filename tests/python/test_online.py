@@ -8,8 +8,9 @@ from benchmarks.problems import chain, paper
 
 import dqslam as dq
 from dqslam import _core
+from dqslam.assumptions import BoxNoise
+from dqslam.graph import build_graph, solve
 from dqslam.online import Motion, OnlineSlam, StepBoxes, StepError, StepPositions, replay, steps_of
-from dqslam.problem import BoxNoise, build_graph, solve
 
 NOISE = BoxNoise(pixels=1.0, relative=0.0)
 STEP = Motion([0.25, 0.0, 0.0], np.diag([1e-4, 1e-5, 1e-4]))

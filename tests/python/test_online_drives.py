@@ -20,7 +20,7 @@ def steps(problem):
 
 
 def errors(camera, given, truth):
-    """RMSE before a polish and after it, metres."""
+    """RMSE before a polish and after it, meters."""
 
     def rmse():
         apart = (slam.trajectory - truth)[:, :2]

@@ -6,18 +6,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from benchmarks.problems import chain
+from test_associate_judge import circle
 
 import dqslam as dq
-from dqslam.associate.thinning import thin_recording
-from dqslam.evaluate import score_association
-from dqslam.io import OdometryNoise
+from dqslam.association.thinning import thin_recording
+from dqslam.assumptions import BoxNoise, OdometryNoise
+from dqslam.metrics import score_association
 from dqslam.online import Motion, OnlineSlam, StepBoxes, StepError, replay, steps_of
-from dqslam.online.journal import Journal
-from dqslam.online.leg import Leg
-from dqslam.online.reach import Reach
-from dqslam.problem import BoxNoise
+from dqslam.online.integrated_odometry import Leg
+from dqslam.online.keyframes import Journal
+from dqslam.online.look_back import Reach
 from scenes import CAMERA, Film, Thing, film, orbit_poses, switched_ids, table_things
-from test_associate_judge import circle
 
 NOISE = OdometryNoise(0.02, 0.01)
 BOXES = BoxNoise(1.0, 0.02)

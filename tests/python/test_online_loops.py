@@ -1,4 +1,4 @@
-"""A large loop: the drive comes back to where it began, metres beside it by odometry."""
+"""A large loop: the drive comes back to where it began, meters beside it by odometry."""
 
 import numpy as np
 import pytest

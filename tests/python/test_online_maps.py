@@ -8,10 +8,10 @@ from benchmarks.problems import chain
 
 import dqslam as dq
 from dqslam import _core
+from dqslam.assumptions import BoxNoise
 from dqslam.io import FileError
 from dqslam.online import OnlineSlam, StepBoxes, steps_of
 from dqslam.online.maps import load_map
-from dqslam.problem import BoxNoise
 
 NOISE = BoxNoise(pixels=1.0, relative=0.0)
 
@@ -55,7 +55,7 @@ def test_boxes_tell_where_the_robot_is(problem, mapped):
     scores = []
     for number in [row for row in range(300, 521, 10) if len(steps[row].boxes.box) >= 3]:
         boxes = steps[number].boxes
-        found = mapped.relocalise(boxes)
+        found = mapped.relocalize(boxes)
         truth = problem.truth.poses[number]
         scores.append(chi_square(found.pose, truth, found.covariance))
         assert np.hypot(*(found.pose - truth)[:2]) < 0.3
@@ -68,8 +68,8 @@ def test_boxes_tell_where_the_robot_is(problem, mapped):
 def test_classes_alone_tell_it_too(problem, mapped, again):
     boxes = list(steps_of(problem.recording))[again].boxes
     unknown = replace(boxes, object_id=np.full(len(boxes.box), -1))
-    known = mapped.relocalise(boxes)
-    found = mapped.relocalise(unknown)
+    known = mapped.relocalize(boxes)
+    found = mapped.relocalize(unknown)
     np.testing.assert_allclose(found.pose, known.pose, atol=1e-3)
     shown = found.object_id
     assert (shown[shown >= 0] == np.asarray(boxes.object_id)[shown >= 0]).all()
@@ -79,9 +79,9 @@ def test_too_few_boxes_are_refused(problem, mapped, again):
     boxes = list(steps_of(problem.recording))[again].boxes
     one = StepBoxes(boxes.box[:1], boxes.object_id[:1], boxes.class_name[:1])
     with pytest.raises(ValueError, match="1 boxes show objects of the map, 2 are needed"):
-        mapped.relocalise(one)
+        mapped.relocalize(one)
     with pytest.raises(ValueError, match="0 boxes show objects of the map, 2 are needed"):
-        mapped.relocalise(StepBoxes(boxes.box[:1], [9999]))
+        mapped.relocalize(StepBoxes(boxes.box[:1], [9999]))
 
 
 def test_boxes_of_nowhere_are_refused(mapped):
@@ -90,7 +90,7 @@ def test_boxes_of_nowhere_are_refused(mapped):
         [[10, 10, 20, 900], [300, 10, 1200, 20], [600, 10, 610, 20], [0, 0, 5, 5]], ids
     )
     with pytest.raises(ValueError, match="no pose explains"):
-        mapped.relocalise(boxes)
+        mapped.relocalize(boxes)
 
 
 def test_a_symmetric_map_is_ambiguous():
@@ -103,7 +103,7 @@ def test_a_symmetric_map_is_ambiguous():
     box, _ = _core.project_to_boxes(
         dq.PoseModel.SE2, camera, np.repeat(pose, 2, axis=0), ellipsoids
     )
-    found = _core.relocalise(
+    found = _core.relocalize(
         dq.PoseModel.SE2,
         camera,
         ellipsoids,

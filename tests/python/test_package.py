@@ -31,13 +31,6 @@ def test_every_public_name_is_there(name):
     assert name in dir(dqslam)
 
 
-def test_a_module_does_not_hide_the_function_of_its_name():
-    import dqslam.simulate
-
-    assert callable(dqslam.simulate)
-    assert dqslam.simulate is sys.modules["dqslam.simulate"].simulate
-
-
 def test_an_unknown_name():
     with pytest.raises(AttributeError, match="module 'dqslam' has no attribute 'simulat'"):
         dqslam.simulat  # noqa: B018

@@ -11,7 +11,7 @@ from PIL import Image
 
 import planted
 from dqslam import Camera, _core, io
-from dqslam.evaluate_results import fit_boxes
+from dqslam.evaluation import fit_boxes
 from dqslam.plot.overlay import Overlay, save_stills, save_video, usual_rate
 
 SIZE = (planted.CAMERA.width, planted.CAMERA.height)

@@ -10,8 +10,8 @@ pytest.importorskip("matplotlib")
 import planted
 import scenes
 from dqslam import io
-from dqslam.evaluate import align_poses
-from dqslam.evaluate_results import fit_boxes, pose_errors
+from dqslam.evaluation import fit_boxes, pose_errors
+from dqslam.metrics import align_poses
 from dqslam.plot import plot_results
 from dqslam.plot.above import from_above, outline
 from dqslam.plot.boxes import draw_worst_and_median
@@ -83,7 +83,7 @@ def test_no_line_crosses_a_gap():
     assert [len(part) for part in break_at_gaps(np.zeros(1), np.zeros((1, 2)))] == [1, 1]
 
 
-def test_frequent_classes_have_the_first_colours_and_none_two():
+def test_frequent_classes_have_the_first_colors_and_none_two():
     names = ["a", "b", "b", *"cdefghij"]
     styles = class_styles(names)
     assert next(iter(styles)) == "b"

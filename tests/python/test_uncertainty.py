@@ -162,7 +162,7 @@ def test_squares_are_in_sigmas_and_by_degrees_of_freedom():
 
 @cache
 def mean_nees(drives=60):
-    """Of the last pose and of all centres, over short drives of a world that is as believed."""
+    """Of the last pose and of all centers, over short drives of a world that is as believed."""
     path = HONEST.path.model_copy(update={"length_m": 10.0, "width_m": 7.0, "laps": 1})
     world = HONEST.world.model_copy(update={"object_count": 6})
     scenario = HONEST.model_copy(update={"path": path, "world": world})

@@ -60,7 +60,7 @@ def test_the_slider_moves_through_the_images(page, scene):
 
 
 def count_pixels(page, color):
-    """Count the pixels of the map that have the hue of a colour."""
+    """Count the pixels of the map that have the hue of a color."""
     from PIL import Image
 
     seen = np.asarray(Image.open(BytesIO(page.screenshot())).convert("RGB"))[:, :900].astype(float)

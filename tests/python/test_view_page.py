@@ -69,7 +69,7 @@ def settle(page):
 
 
 def pixels(page, color, canvas="space"):
-    """Count the pixels of a canvas that have nearly a colour."""
+    """Count the pixels of a canvas that have nearly a color."""
     settle(page)
     return page.evaluate(
         """([id, [r, g, b]]) => {

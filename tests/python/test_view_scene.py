@@ -50,7 +50,7 @@ def test_nothing_is_drawn_where_the_truth_is_unknown(files):
 
 def test_numbers_are_those_of_the_evaluation(files):
     numbers = {one.id: dict(one.numbers) for one in look(files).objects}
-    assert numbers[10]["centre is off by"] == "0.02 m"
+    assert numbers[10]["center is off by"] == "0.02 m"
     assert numbers[11]["size is off by"] == "10%"
     assert numbers[11]["volume ratio"] == "1.33"
     assert numbers[12]["turned by"] == "10.0°"
@@ -72,7 +72,7 @@ def test_boxes_say_what_became_of_them(files):
     assert [state == "left out" for state in boxes.state] == (boxes.object < 0).tolist()
 
 
-def test_a_class_has_a_colour(files):
+def test_a_class_has_a_color(files):
     scene = look(files)
     colors = {one.class_name: one.color for one in scene.objects}
     assert len(set(colors.values())) == len(colors) == 4
@@ -100,7 +100,7 @@ def test_the_spread_is_an_ellipsoid_of_the_covariance(files):
     turn = planted.TURNS[3].as_matrix()
     covariance = turn @ np.diag([0.04, 0.09, 0.01]) @ turn.T
     one = replace(look(files).objects[0], center_covariance=covariance)
-    # A point of it is 3 sigma from the centre.
+    # A point of it is 3 sigma from the center.
     np.testing.assert_allclose(shape_of(one.spread), 9.0 * covariance, atol=1e-12)
 
 

@@ -59,7 +59,7 @@ def test_a_core_that_needs_more_than_the_system_is_refused(
         check_wheel.main(wheel)
 
 
-def test_size_name_licences_and_binaries_are_checked(
+def test_size_name_licenses_and_binaries_are_checked(
     tmp_path: Path, check_wheel: ModuleType
 ) -> None:
     path = tmp_path / "dqslam-linux.whl"
@@ -72,8 +72,8 @@ def test_size_name_licences_and_binaries_are_checked(
     assert check_wheel.faults(path) == [
         f"it has {size} bytes, {size} are allowed",
         "its name promises no manylinux platform",
-        "the licence ceres-solver.txt is missing",
-        "the licence pybind11.txt is missing",
+        "the license ceres-solver.txt is missing",
+        "the license pybind11.txt is missing",
         "its binaries are dqslam.libs/libgomp.so.1, not _core alone",
     ]
 

@@ -1,5 +1,5 @@
 // The paper's box residual:  r_k = l_k^T P Q* P^T l_k / sigma for the four lines of the box,
-// l_k = x_a cross x_b of neighbouring corners in homogeneous pixels.   [S&M17] eqs. (5), (7)
+// l_k = x_a cross x_b of neighboring corners in homogeneous pixels.   [S&M17] eqs. (5), (7)
 // Normalized: divided by (P Q* P^T)_33, which the paper leaves at its value of p_z^2 - S_zz.
 //
 // Blocks: world_from_robot [d], landmark [9].  Residual: [4], in sigmas.
@@ -7,9 +7,9 @@
 // the camera's focal plane meets the object.
 #pragma once
 
-#include "dqslam/costs/cost.h"
-#include "dqslam/ellipsoid.h"
-#include "dqslam/whitening.h"
+#include "dqslam/costs/autodiff_cost.h"
+#include "dqslam/costs/whitening.h"
+#include "dqslam/geometry/ellipsoid.h"
 
 namespace dqslam {
 

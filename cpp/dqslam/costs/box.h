@@ -6,9 +6,9 @@
 // Returns false, so that Ceres rejects the step, unless the object is strictly in front.
 #pragma once
 
-#include "dqslam/costs/cost.h"
-#include "dqslam/ellipsoid.h"
-#include "dqslam/whitening.h"
+#include "dqslam/costs/autodiff_cost.h"
+#include "dqslam/costs/whitening.h"
+#include "dqslam/geometry/ellipsoid.h"
 
 namespace dqslam {
 

@@ -5,9 +5,9 @@
 // forward and then turns by omega: the relative pose (v, 0, omega).
 #pragma once
 
-#include "dqslam/costs/cost.h"
-#include "dqslam/pose.h"
-#include "dqslam/whitening.h"
+#include "dqslam/costs/autodiff_cost.h"
+#include "dqslam/costs/whitening.h"
+#include "dqslam/geometry/pose.h"
 
 namespace dqslam {
 

@@ -1,19 +1,19 @@
-// Measured position of an object's centre:  r = W (z_ij - T_i(q^t_j)).   [S&M17] eq. (8)
+// Measured position of an object's center:  r = W (z_ij - T_i(q^t_j)).   [S&M17] eq. (8)
 //
 // Blocks: world_from_robot [d], landmark [9].  Residual: [3], in sigmas.  Never fails.
-// T_i takes the centre from the world into the robot frame.
+// T_i takes the center from the world into the robot frame.
 #pragma once
 
-#include "dqslam/costs/cost.h"
-#include "dqslam/ellipsoid.h"
-#include "dqslam/whitening.h"
+#include "dqslam/costs/autodiff_cost.h"
+#include "dqslam/costs/whitening.h"
+#include "dqslam/geometry/ellipsoid.h"
 
 namespace dqslam {
 
 template <typename Pose, typename Landmark>
 struct RelativePositionCost
     : AutoDiffCost<RelativePositionCost<Pose, Landmark>, 3, Pose::kSize, kLandmarkSize> {
-  Eigen::Vector3d object_in_robot;  ///< metres
+  Eigen::Vector3d object_in_robot;  ///< meters
   Eigen::Matrix3d sqrt_information;
 
   template <typename T>

@@ -11,8 +11,8 @@
 // None of them fails.
 #pragma once
 
-#include "dqslam/costs/cost.h"
-#include "dqslam/ellipsoid.h"
+#include "dqslam/costs/autodiff_cost.h"
+#include "dqslam/geometry/ellipsoid.h"
 
 namespace dqslam {
 
@@ -32,8 +32,8 @@ struct UprightCost : AutoDiffCost<UprightCost, 3, kLandmarkSize> {
 
 struct SupportPlaneCost : AutoDiffCost<SupportPlaneCost, 1, kLandmarkSize> {
   Eigen::Vector3d up;
-  double offset;  ///< d, metres
-  double sigma;   ///< metres
+  double offset;  ///< d, meters
+  double sigma;   ///< meters
 
   template <typename T>
   bool operator()(const T* ellipsoid, T* residual) const {
@@ -50,9 +50,9 @@ template <typename Pose>
 struct CameraHeightCost : AutoDiffCost<CameraHeightCost<Pose>, 1, Pose::kSize> {
   Mount mount;
   Eigen::Vector3d up;
-  double offset;  ///< d, metres
-  double height;  ///< metres
-  double sigma;   ///< metres
+  double offset;  ///< d, meters
+  double height;  ///< meters
+  double sigma;   ///< meters
 
   template <typename T>
   bool operator()(const T* pose, T* residual) const {

@@ -12,8 +12,8 @@
 #include <Eigen/Eigenvalues>
 #include <cmath>
 
-#include "dqslam/costs/cost.h"
-#include "dqslam/ellipsoid.h"
+#include "dqslam/costs/autodiff_cost.h"
+#include "dqslam/geometry/ellipsoid.h"
 
 namespace dqslam {
 
@@ -60,8 +60,8 @@ bool LogSymmetric(const Matrix3<ceres::Jet<double, N>>& S, Matrix3<ceres::Jet<do
 }
 
 struct SizePriorCost : AutoDiffCost<SizePriorCost, 6, kLandmarkSize> {
-  double log_mean;   ///< log metres
-  double log_sigma;  ///< log metres
+  double log_mean;   ///< log meters
+  double log_sigma;  ///< log meters
 
   template <typename T>
   bool operator()(const T* ellipsoid, T* residual) const {

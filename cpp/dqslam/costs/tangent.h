@@ -5,15 +5,15 @@
 // on the object's far side.
 //
 // Blocks: world_from_robot [d], landmark [9].  Residual: [4], in sigmas.
-// The scale focal / depth turns metres into pixels; `depth` is frozen while a stage runs.
+// The scale focal / depth turns meters into pixels; `depth` is frozen while a stage runs.
 // Edges flagged one_sided count only where the object ends inside the box.
-// Affine in the centre and defined everywhere for ellipsoids: behind, beside and inside too.
+// Affine in the center and defined everywhere for ellipsoids: behind, beside and inside too.
 // Returns false where n^T S n is not positive (only a dual quadric that is no ellipsoid).
 #pragma once
 
-#include "dqslam/costs/cost.h"
-#include "dqslam/ellipsoid.h"
-#include "dqslam/whitening.h"
+#include "dqslam/costs/autodiff_cost.h"
+#include "dqslam/costs/whitening.h"
+#include "dqslam/geometry/ellipsoid.h"
 
 namespace dqslam {
 
@@ -24,7 +24,7 @@ struct TangentCost
   Mount mount;
   Eigen::Vector4d observed;          ///< pixels
   Eigen::Matrix4d sqrt_information;  ///< 1 / pixels
-  double depth;                      ///< metres
+  double depth;                      ///< meters
   EdgeFlags one_sided = EdgeFlags::Constant(false);
 
   template <typename T>

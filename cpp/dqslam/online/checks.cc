@@ -57,7 +57,7 @@ typename History<Pose>::Step CheckedStep(const Eigen::VectorXd& relative,
   step.relative = relative;
   step.covariance.setIdentity();
   step.sqrt_information.setIdentity();
-  step.first_sight = 0;
+  step.first_observation = 0;
   if (first_is_known) return step;
   if (covariance.rows() != k || covariance.cols() != k) {
     throw std::invalid_argument("odometry_covariance: expected shape (" + std::to_string(k) + ", " +

@@ -5,9 +5,9 @@
 #include <stdexcept>
 #include <string>
 
-#include "dqslam/graph.h"
+#include "dqslam/costs/whitening.h"
 #include "dqslam/online/history.h"
-#include "dqslam/whitening.h"
+#include "dqslam/problem/graph.h"
 
 namespace dqslam::online {
 

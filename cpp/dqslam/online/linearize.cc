@@ -3,19 +3,19 @@
 #include <cmath>
 #include <limits>
 
-#include "dqslam/costs/autodiff.h"
 #include "dqslam/costs/odometry.h"
 #include "dqslam/costs/scene_priors.h"
 #include "dqslam/costs/size_prior.h"
+#include "dqslam/geometry/jets.h"
 
 namespace dqslam {
 
-struct ChartModel;
+struct CenterShapeModel;
 
-// For ByPoseAndLandmark(): derivatives by the chart instead of a landmark's parameters.
+// For ByPoseAndLandmark(): derivatives by the center_shape instead of a landmark's parameters.
 template <>
-struct Unpacked<ChartModel> {
-  explicit Unpacked(const Vector9d& chart) : surface(online::SurfaceOf(chart)) {}
+struct Unpacked<CenterShapeModel> {
+  explicit Unpacked(const Vector9d& center_shape) : surface(online::SurfaceOf(center_shape)) {}
   Vector9d Gradient(const Eigen::Vector3d& m, double by_center, double by_shape) const {
     const Eigen::Vector3d b = by_shape * m;
     Vector9d gradient;
@@ -48,7 +48,7 @@ void Weigh(double loss_scale, double s, double* cost, double* loss) {
 // where they are asked for; false where it is undefined.
 template <bool kDerivatives>
 bool EdgeErrors(const Camera& camera,
-                const Sight& sight,
+                const Observation& observation,
                 const Surface<double>& in_camera,
                 double depth,
                 Vector4d* error,
@@ -60,17 +60,18 @@ bool EdgeErrors(const Camera& camera,
     } else {
       if (!ProjectToBox(in_camera, camera, &box)) return false;
     }
-    *error = box - sight.value;
-    if (!sight.truncated.any()) return true;
-    IgnoreBeyond(OneSidedEdges(sight.truncated, camera, in_camera, box), error);
+    *error = box - observation.value;
+    if (!observation.truncated.any()) return true;
+    IgnoreBeyond(OneSidedEdges(observation.truncated, camera, in_camera, box), error);
   } else {
     if constexpr (kDerivatives) {
-      if (!DifferentiateTangents(in_camera, camera, sight.value, depth, error, edges)) return false;
+      if (!DifferentiateTangents(in_camera, camera, observation.value, depth, error, edges))
+        return false;
     } else {
-      if (!TangentDistances(in_camera, camera, sight.value, depth, error)) return false;
+      if (!TangentDistances(in_camera, camera, observation.value, depth, error)) return false;
     }
-    if (!sight.truncated.any()) return true;
-    IgnoreBeyond(sight.truncated, error, kTangentOutward);
+    if (!observation.truncated.any()) return true;
+    IgnoreBeyond(observation.truncated, error, kTangentOutward);
   }
   if constexpr (kDerivatives) {
     // Ignored.
@@ -85,8 +86,8 @@ bool EdgeErrors(const Camera& camera,
 template <typename Pose>
 Vector4d LinearizeBox(const Model& model,
                       const Station& station,
-                      const Sight& sight,
-                      const Unpacked<ChartModel>& object,
+                      const Observation& observation,
+                      const Unpacked<CenterShapeModel>& object,
                       Edges residual,
                       Linear<Pose>* linear) {
   const Surface<double> in_camera = ToCamera(station.camera, object.surface);
@@ -94,10 +95,10 @@ Vector4d LinearizeBox(const Model& model,
   EdgeDerivatives edges;
   linear->depth = 0;
   if (residual == Edges::kTangent ||
-      !EdgeErrors<true>(model.camera, sight, in_camera, 0, &error, &edges)) {
+      !EdgeErrors<true>(model.camera, observation, in_camera, 0, &error, &edges)) {
     linear->depth = TangentDepth(in_camera);
-    if (!EdgeErrors<true>(model.camera, sight, in_camera, linear->depth, &error, &edges)) {
-      // A shape that rounding has flattened: CostOfSight() is infinite there.
+    if (!EdgeErrors<true>(model.camera, observation, in_camera, linear->depth, &error, &edges)) {
+      // A shape that rounding has flattened: CostOfObservation() is infinite there.
       linear->by_pose.setZero();
       linear->by_object.setZero();
       return Vector4d::Zero();
@@ -109,22 +110,24 @@ Vector4d LinearizeBox(const Model& model,
 }
 
 // r = z - q, q = R^T (c - t).
-Vector4d PositionError(const Station& station, const Sight& sight, const Vector3d& center) {
+Vector4d PositionError(const Station& station,
+                       const Observation& observation,
+                       const Vector3d& center) {
   const Rigid<double>& robot = station.world_from_robot;
   Vector4d error = Vector4d::Zero();
   error.head<3>() =
-      sight.value.head<3>() - robot.rotation.transpose() * (center - robot.translation);
+      observation.value.head<3>() - robot.rotation.transpose() * (center - robot.translation);
   return error;
 }
 
 template <typename Pose>
 Vector4d LinearizePosition(const Station& station,
-                           const Sight& sight,
+                           const Observation& observation,
                            const Vector3d& center,
                            Linear<Pose>* linear) {
-  const Vector4d error = PositionError(station, sight, center);
+  const Vector4d error = PositionError(station, observation, center);
   const Eigen::Matrix3d& R = station.world_from_robot.rotation;
-  const Vector3d q = sight.value.head<3>() - error.head<3>();
+  const Vector3d q = observation.value.head<3>() - error.head<3>();
   linear->depth = 0;
   linear->by_pose.setZero();
   linear->by_object.setZero();
@@ -143,42 +146,47 @@ Vector4d LinearizePosition(const Station& station,
 
 }  // namespace
 
-double CostOfSight(const Model& model,
-                   const Station& station,
-                   const Sight& sight,
-                   const Vector9d& chart,
-                   double depth,
-                   double* chi_square) {
-  const Surface<double> object = SurfaceOf(chart);
+double CostOfObservation(const Model& model,
+                         const Station& station,
+                         const Observation& observation,
+                         const Vector9d& center_shape,
+                         double depth,
+                         double* chi_square) {
+  const Surface<double> object = SurfaceOf(center_shape);
   Vector4d error;
   *chi_square = std::numeric_limits<double>::infinity();
-  if (!sight.is_box) {
-    error = PositionError(station, sight, object.center);
-  } else if (!EdgeErrors<false>(
-                 model.camera, sight, ToCamera(station.camera, object), depth, &error, nullptr)) {
+  if (!observation.is_box) {
+    error = PositionError(station, observation, object.center);
+  } else if (!EdgeErrors<false>(model.camera,
+                                observation,
+                                ToCamera(station.camera, object),
+                                depth,
+                                &error,
+                                nullptr)) {
     return *chi_square;
   }
-  *chi_square = (sight.sqrt_information * error).squaredNorm();
+  *chi_square = (observation.sqrt_information * error).squaredNorm();
   double cost, loss;
-  Weigh(sight.is_box ? model.loss_scale : 0, *chi_square, &cost, &loss);
+  Weigh(observation.is_box ? model.loss_scale : 0, *chi_square, &cost, &loss);
   return cost;
 }
 
 template <typename Pose>
 void Linearize(const Model& model,
                const Station& station,
-               const Sight& sight,
-               const Vector9d& chart,
+               const Observation& observation,
+               const Vector9d& center_shape,
                Edges edges,
                Linear<Pose>* linear) {
-  const Unpacked<ChartModel> object(chart);
-  const Eigen::Matrix4d& W = sight.sqrt_information;
+  const Unpacked<CenterShapeModel> object(center_shape);
+  const Eigen::Matrix4d& W = observation.sqrt_information;
   linear->residual =
-      W * (sight.is_box ? LinearizeBox(model, station, sight, object, edges, linear)
-                        : LinearizePosition(station, sight, object.surface.center, linear));
+      W * (observation.is_box
+               ? LinearizeBox(model, station, observation, object, edges, linear)
+               : LinearizePosition(station, observation, object.surface.center, linear));
   linear->chi_square = linear->residual.squaredNorm();
   double loss;
-  Weigh(sight.is_box ? model.loss_scale : 0, linear->chi_square, &linear->cost, &loss);
+  Weigh(observation.is_box ? model.loss_scale : 0, linear->chi_square, &linear->cost, &loss);
   linear->residual *= loss;
   const Eigen::Matrix4d weight = loss * W;
   linear->by_pose = weight * linear->by_pose.eval();
@@ -214,11 +222,11 @@ double CostOfStep(const typename History<Pose>::Step& step, const double* from, 
 
 namespace {
 
-// Calls add(residuals, count) for every prior, on the scalar of the chart.
+// Calls add(residuals, count) for every prior, on the scalar of the center_shape.
 template <typename T, typename Add>
-bool ForPriors(const Model& model, const Object& object, const T* chart, Add&& add) {
+bool ForPriors(const Model& model, const Object& object, const T* center_shape, Add&& add) {
   T ellipsoid[9], residual[6];
-  EllipsoidFromChart(chart, ellipsoid);
+  EllipsoidFromCenterShape(center_shape, ellipsoid);
   const SizePriorCost size{{}, object.size.log_mean, object.size.log_sigma};
   if (!size(ellipsoid, residual)) return false;
   add(residual, 6);
@@ -236,11 +244,14 @@ bool ForPriors(const Model& model, const Object& object, const T* chart, Add&& a
 
 }  // namespace
 
-double AddPriors(const Model& model, const Object& object, const Vector9d& chart, Quadratic* sum) {
+double AddPriors(const Model& model,
+                 const Object& object,
+                 const Vector9d& center_shape,
+                 GaussianPrior* sum) {
   using Jet = ceres::Jet<double, 9>;
   Jet at[9];
-  PlainJets<9>(chart.data(), 0, at);
-  double cost = CostOf(object.map, chart);
+  PlainJets<9>(center_shape.data(), 0, at);
+  double cost = CostOf(object.map, center_shape);
   const bool defined = ForPriors(model, object, at, [&](const Jet* residual, int count) {
     for (int i = 0; i < count; ++i) {
       sum->H.noalias() += residual[i].v * residual[i].v.transpose();
@@ -249,16 +260,16 @@ double AddPriors(const Model& model, const Object& object, const Vector9d& chart
     }
   });
   sum->H += object.map.H;
-  sum->g += GradientOf(object.map, chart);
+  sum->g += GradientOf(object.map, center_shape);
   return defined ? cost : std::numeric_limits<double>::infinity();
 }
 
-double CostOfPriors(const Model& model, const Object& object, const Vector9d& chart) {
-  double cost = CostOf(object.map, chart);
+double CostOfPriors(const Model& model, const Object& object, const Vector9d& center_shape) {
+  double cost = CostOf(object.map, center_shape);
   const auto add = [&](const double* residual, int count) {
     for (int i = 0; i < count; ++i) cost += 0.5 * residual[i] * residual[i];
   };
-  const bool defined = ForPriors(model, object, chart.data(), add);
+  const bool defined = ForPriors(model, object, center_shape.data(), add);
   return defined ? cost : std::numeric_limits<double>::infinity();
 }
 
@@ -280,13 +291,13 @@ double LinearizeHeight(const Model& model,
   return residual.a;
 }
 
-#define DQSLAM_INSTANTIATE(Pose)                                                              \
-  template void Linearize<Pose>(                                                              \
-      const Model&, const Station&, const Sight&, const Vector9d&, Edges, Linear<Pose>*);     \
-  template LinearStep<Pose> LinearizeStep<Pose>(                                              \
-      const History<Pose>::Step&, const double*, const double*);                              \
-  template double CostOfStep<Pose>(const History<Pose>::Step&, const double*, const double*); \
-  template double LinearizeHeight<Pose>(                                                      \
+#define DQSLAM_INSTANTIATE(Pose)                                                                \
+  template void Linearize<Pose>(                                                                \
+      const Model&, const Station&, const Observation&, const Vector9d&, Edges, Linear<Pose>*); \
+  template LinearStep<Pose> LinearizeStep<Pose>(                                                \
+      const History<Pose>::Step&, const double*, const double*);                                \
+  template double CostOfStep<Pose>(const History<Pose>::Step&, const double*, const double*);   \
+  template double LinearizeHeight<Pose>(                                                        \
       const Model&, const double*, Eigen::Matrix<double, Pose::kTangentSize, 1>*)
 DQSLAM_INSTANTIATE(Se2);
 DQSLAM_INSTANTIATE(Se3);

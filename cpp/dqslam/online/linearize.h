@@ -1,13 +1,13 @@
-// Residuals and their derivatives by the tangent of the pose and the chart of the object.
+// Residuals and their derivatives by the tangent of the pose and the center_shape of the object.
 //
-// The edges' own are in edges.h; here they go on to the chart, in which the derivative of n^T S n
-// is the products of n's entries.  Where the object is not strictly in front, the tangent residual
-// takes the place of the box's, see costs/tangent.h.
+// The edges' own are in edges.h; here they go on to the center_shape, in which the derivative of
+// n^T S n is the products of n's entries.  Where the object is not strictly in front, the tangent
+// residual takes the place of the box's, see costs/tangent.h.
 #pragma once
 
-#include "dqslam/edges.h"
-#include "dqslam/graph.h"
+#include "dqslam/geometry/box_derivatives.h"
 #include "dqslam/online/history.h"
+#include "dqslam/problem/graph.h"
 
 namespace dqslam::online {
 
@@ -31,14 +31,15 @@ struct Linear {
   double depth;       ///< of the tangent residual [m], 0 where it is the box's
 };
 
-/// Cost of a sight after the loss, and its chi-square before; with the residual that Linearize()
-/// used, of that depth.  Infinite where it is the box's and the object is not strictly in front.
-double CostOfSight(const Model& model,
-                   const Station& station,
-                   const Sight& sight,
-                   const Vector9d& chart,
-                   double depth,
-                   double* chi_square);
+/// Cost of a observation after the loss, and its chi-square before; with the residual that
+/// Linearize() used, of that depth.  Infinite where it is the box's and the object is not strictly
+/// in front.
+double CostOfObservation(const Model& model,
+                         const Station& station,
+                         const Observation& observation,
+                         const Vector9d& center_shape,
+                         double depth,
+                         double* chi_square);
 
 /// Which residual a box has where its object is in front; elsewhere it is the tangent's.
 enum class Edges { kBox, kTangent };
@@ -47,8 +48,8 @@ enum class Edges { kBox, kTangent };
 template <typename Pose>
 void Linearize(const Model& model,
                const Station& station,
-               const Sight& sight,
-               const Vector9d& chart,
+               const Observation& observation,
+               const Vector9d& center_shape,
                Edges edges,
                Linear<Pose>* linear);
 
@@ -70,16 +71,19 @@ template <typename Pose>
 double CostOfStep(const typename History<Pose>::Step& step, const double* from, const double* to);
 
 /// Adds the priors of an object to H and g and returns their cost; infinite where they fail.
-double AddPriors(const Model& model, const Object& object, const Vector9d& chart, Quadratic* sum);
-double CostOfPriors(const Model& model, const Object& object, const Vector9d& chart);
+double AddPriors(const Model& model,
+                 const Object& object,
+                 const Vector9d& center_shape,
+                 GaussianPrior* sum);
+double CostOfPriors(const Model& model, const Object& object, const Vector9d& center_shape);
 
-/// Cost of a quadratic at a chart; its gradient there.
-inline double CostOf(const Quadratic& quadratic, const Vector9d& chart) {
-  const Vector9d d = chart - quadratic.origin;
+/// Cost of a quadratic at a center_shape; its gradient there.
+inline double CostOf(const GaussianPrior& quadratic, const Vector9d& center_shape) {
+  const Vector9d d = center_shape - quadratic.origin;
   return quadratic.cost + quadratic.g.dot(d) + 0.5 * d.dot(quadratic.H * d);
 }
-inline Vector9d GradientOf(const Quadratic& quadratic, const Vector9d& chart) {
-  return quadratic.g + quadratic.H * (chart - quadratic.origin);
+inline Vector9d GradientOf(const GaussianPrior& quadratic, const Vector9d& center_shape) {
+  return quadratic.g + quadratic.H * (center_shape - quadratic.origin);
 }
 
 /// Derivatives by a pose of the camera's known height: J (k), residual; cost 0 where it is unknown.

@@ -31,13 +31,13 @@ void Merge(const RowMatrix& poses, const RowMatrix& ellipsoids, History<Pose>* h
     Object& object = history->objects[row];
     object.is_stale = true;
     if (row < objects) {
-      object.chart = ChartFromEllipsoid(ellipsoids.row(row).transpose());
+      object.center_shape = CenterShapeFromEllipsoid(ellipsoids.row(row).transpose());
       continue;
     }
-    Surface<double> surface = SurfaceOf(object.chart);
+    Surface<double> surface = SurfaceOf(object.center_shape);
     surface.center = turn * (surface.center - before.translation) + after.translation;
     surface.shape = turn * surface.shape * turn.transpose();
-    object.chart = ChartFromSurface(surface);
+    object.center_shape = CenterShapeFromSurface(surface);
   }
 }
 

@@ -1,8 +1,8 @@
 // What was estimated elsewhere, taken over by a history that has gone on meanwhile.
 #pragma once
 
-#include "dqslam/graph.h"
 #include "dqslam/online/history.h"
+#include "dqslam/problem/graph.h"
 
 namespace dqslam::online {
 

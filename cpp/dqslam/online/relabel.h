@@ -4,23 +4,23 @@
 
 #include <vector>
 
-#include "dqslam/graph.h"
 #include "dqslam/online/history.h"
+#include "dqslam/problem/graph.h"
 
 namespace dqslam::online {
 
 /// Boxes by their rows in the history, and the object each is of now: -1 waits, those from the
 /// number of objects on are new, in order.
 struct NewLabels {
-  IndexVector sight;
+  IndexVector observation;
   IndexVector object;
   RowMatrix ellipsoid;  ///< (m, 9) where the new objects start, log-Cholesky, in the world
   Eigen::VectorXd log_size_mean;  ///< of the new objects
   Eigen::VectorXd log_size_sigma;
 };
 
-/// An object whose sights have changed.
-struct Relabelled {
+/// An object whose observations have changed.
+struct Relabeled {
   int object;
   /// Poses before and after the longest absence that it has only now; the same where it has none.
   int last, back;
@@ -31,8 +31,9 @@ template <typename Pose>
 void CheckLabels(const NewLabels& given, const History<Pose>& history);
 
 /// Moves boxes from object to object, adds the new objects, and leaves the others where they are.
-/// The labels have been checked.  Work is that of the boxes and of the sights of their objects.
+/// The labels have been checked.  WindowResult is that of the boxes and of the observations of
+/// their objects.
 template <typename Pose>
-std::vector<Relabelled> Relabel(const NewLabels& given, History<Pose>* history);
+std::vector<Relabeled> Relabel(const NewLabels& given, History<Pose>* history);
 
 }  // namespace dqslam::online

@@ -6,7 +6,7 @@ namespace dqslam::online {
 namespace {
 
 constexpr double kLapObjects = 40;  // in the front of a lap of full length, at most
-// A young session minimises a lap whenever it has grown by this share, after so many steps.
+// A young session minimizes a lap whenever it has grown by this share, after so many steps.
 constexpr int kLapGrowth = 4, kSoonestLap = 16;
 constexpr double kMostCredit = 3;
 

@@ -1,15 +1,15 @@
-// Which poses are minimised beside the window's, and when.
+// Which poses are minimized beside the window's, and when.
 #pragma once
 
 #include "dqslam/online/options.h"
 
 namespace dqslam::online {
 
-/// What a minimisation of the window says of how well all fits.
+/// What a minimization of the window says of how well all fits.
 struct WindowFit {
   int begin = 0, end = 0;  ///< its poses
   double chi_square = 0;   ///< per residual: 1 where the model is right
-  int undefined = 0;       ///< sights whose objects are not in front
+  int undefined = 0;       ///< observations whose objects are not in front
 };
 
 /// Poses from `begin` on; none where that is the window's begin.
@@ -36,7 +36,8 @@ class Schedule {
   /// Called once a step.
   Smoothing Choose(const WindowFit& window);
 
-  /// Work is square in the objects of the front: where there are many, laps have fewer poses.
+  /// WindowResult is square in the objects of the front: where there are many, laps have fewer
+  /// poses.
   void SmoothedWith(int poses, int objects_in_front);
 
  private:

@@ -4,16 +4,16 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "dqslam/dispatch.h"
+#include "dqslam/costs/whitening.h"
+#include "dqslam/geometry/dispatch.h"
 #include "dqslam/online/checks.h"
-#include "dqslam/online/close_loop.h"
+#include "dqslam/online/initialize_object.h"
+#include "dqslam/online/loop_closing.h"
 #include "dqslam/online/merge.h"
-#include "dqslam/online/recover.h"
-#include "dqslam/online/region.h"
+#include "dqslam/online/reinitialize.h"
 #include "dqslam/online/schedule.h"
-#include "dqslam/online/start.h"
 #include "dqslam/online/to_graph.h"
-#include "dqslam/whitening.h"
+#include "dqslam/online/window.h"
 
 namespace dqslam::online {
 namespace {
@@ -22,9 +22,9 @@ namespace {
 // equations: with more damping than this it only creeps.
 constexpr double kFirstDamping = 1e-8;
 constexpr double kMostDamping = 1e-2;  // that a window takes over from the one before
-// An object is started again when it has so many sights.
-constexpr int kTryAgainAt[] = {4, 8, 16, 32};
-constexpr int kSettleIterations = 6;
+// An object is started again when it has so many observations.
+constexpr int kReinitializeAt[] = {4, 8, 16, 32};
+constexpr int kRefineIterations = 6;
 
 // The object of a map, with the prior on its size that all objects have: the covariance has it too.
 Object ObjectOfMap(const Model& model,
@@ -32,14 +32,14 @@ Object ObjectOfMap(const Model& model,
                    const Matrix9d& covariance,
                    const SizePrior& size) {
   Object object;
-  object.chart = ChartFromEllipsoid(ellipsoid);
+  object.center_shape = CenterShapeFromEllipsoid(ellipsoid);
   object.size = size;
-  object.map.origin = object.chart;
+  object.map.origin = object.center_shape;
   const Matrix9d W = SqrtInformation<9>(covariance);
-  object.map.H = InformationInChart(object.chart, W.transpose() * W);
-  Quadratic size_prior;
-  AddPriors(model, object, object.chart, &size_prior);
-  object.map.g = -(size_prior.g - GradientOf(object.map, object.chart));
+  object.map.H = InformationInCenterShape(object.center_shape, W.transpose() * W);
+  GaussianPrior size_prior;
+  AddPriors(model, object, object.center_shape, &size_prior);
+  object.map.g = -(size_prior.g - GradientOf(object.map, object.center_shape));
   object.map.H -= size_prior.H - object.map.H;
   return object;
 }
@@ -49,22 +49,22 @@ class SessionOf : public Session {
  public:
   using Storage = typename History<Pose>::Storage;
   using Square = typename History<Pose>::Square;
-  using Past = typename Region<Pose>::Past;
+  using MarginalPriors = typename Window<Pose>::MarginalPriors;
 
   SessionOf(const Camera& camera, const ScenePriors& scene, const OnlineOptions& options)
       : options_(options),
         model_(camera, scene, options.loss_scale),
-        region_(model_),
+        window_(model_),
         schedule_(options) {}
 
   StepReport Add(const Eigen::VectorXd& relative,
                  const RowMatrix& covariance,
-                 const NewSights& given) override {
+                 const StepObservations& given) override {
     const int pose = num_poses(), objects = num_objects();
     const bool first_is_known = pose == 0 && covariance.size() == 0;
     const typename History<Pose>::Step step =
         CheckedStep<Pose>(relative, covariance, first_is_known);
-    const std::vector<Sight> sights = CheckedSights(given, pose, objects);
+    const std::vector<Observation> observations = CheckedObservations(given, pose, objects);
 
     // From here on nothing throws but for want of memory.
     if (pose == 0) history_.first_pose_is_known = first_is_known;
@@ -75,12 +75,12 @@ class SessionOf : public Session {
     }
     history_.poses.push_back(at);
     history_.steps.push_back(step);
-    history_.steps.back().first_sight = static_cast<int>(history_.sights.size());
+    history_.steps.back().first_observation = static_cast<int>(history_.observations.size());
     for (Eigen::Index row = 0; row < given.log_size_mean.size(); ++row) {
       history_.objects.emplace_back();
       history_.objects.back().size = {given.log_size_mean[row], given.log_size_sigma[row]};
     }
-    for (const Sight& sight : sights) See(sight);
+    for (const Observation& observation : observations) See(observation);
     return Update();
   }
 
@@ -100,10 +100,10 @@ class SessionOf : public Session {
 
   void Relabel(const NewLabels& labels) override {
     CheckLabels(labels, history_);
-    for (const Relabelled& changed : online::Relabel(labels, &history_)) {
+    for (const Relabeled& changed : online::Relabel(labels, &history_)) {
       const Object& object = history_.objects[changed.object];
-      if (object.sights.empty()) continue;
-      const int seen = history_.sights[object.sights.back()].pose;
+      if (object.observations.empty()) continue;
+      const int seen = history_.observations[object.observations.back()].pose;
       if (seen < num_poses() - options_.recent_poses) continue;
       const bool is_watched = schedule_.WatchLoop(changed.last, changed.back, num_poses() - 1);
       if (is_watched && Misfits(object)) schedule_.LoopDoesNotFit();
@@ -132,9 +132,10 @@ class SessionOf : public Session {
       throw std::invalid_argument("begin: there is no pose " + std::to_string(begin));
     }
     double damping = kFirstDamping;
-    const Work work = region_.Minimize(&history_, begin, Past::kAnew, iterations, &damping);
+    const WindowResult result =
+        window_.Minimize(&history_, begin, MarginalPriors::kRelinearize, iterations, &damping);
     MarkStale(begin, &history_);
-    return work.cost;
+    return result.cost;
   }
 
   void Merge(const RowMatrix& poses, const RowMatrix& ellipsoids) override {
@@ -167,56 +168,60 @@ class SessionOf : public Session {
   RowMatrix Ellipsoids() const override {
     RowMatrix table(num_objects(), kLandmarkSize);
     for (int row = 0; row < num_objects(); ++row) {
-      EllipsoidFromChart(history_.objects[row].chart.data(), table.row(row).data());
+      EllipsoidFromCenterShape(history_.objects[row].center_shape.data(), table.row(row).data());
     }
     return table;
   }
   IndexVector Observations() const override {
     IndexVector counts = IndexVector::Zero(num_objects());
-    for (const Sight& sight : history_.sights) {
-      if (!sight.Waits()) counts[sight.object] += sight.is_box;
+    for (const Observation& observation : history_.observations) {
+      if (!observation.Waits()) counts[observation.object] += observation.is_box;
     }
     return counts;
   }
 
  private:
-  void See(const Sight& sight) {
-    history_.sights.push_back(sight);
-    if (sight.Waits()) return;
-    Object& object = history_.objects[sight.object];
-    if (!object.sights.empty()) {
-      schedule_.WatchLoop(history_.sights[object.sights.back()].pose, sight.pose, sight.pose);
+  void See(const Observation& observation) {
+    history_.observations.push_back(observation);
+    if (observation.Waits()) return;
+    Object& object = history_.objects[observation.object];
+    if (!object.observations.empty()) {
+      schedule_.WatchLoop(history_.observations[object.observations.back()].pose,
+                          observation.pose,
+                          observation.pose);
     }
-    object.sights.push_back(static_cast<int>(history_.sights.size()) - 1);
-    if (object.chart.isZero(0)) object.chart = Birth(model_, history_, object);
-    const int count = static_cast<int>(object.sights.size());
-    const bool again =
-        std::find(std::begin(kTryAgainAt), std::end(kTryAgainAt), count) != std::end(kTryAgainAt);
+    object.observations.push_back(static_cast<int>(history_.observations.size()) - 1);
+    if (object.center_shape.isZero(0))
+      object.center_shape = InitializeObject(model_, history_, object);
+    const int count = static_cast<int>(object.observations.size());
+    const bool again = std::find(std::begin(kReinitializeAt), std::end(kReinitializeAt), count) !=
+                       std::end(kReinitializeAt);
     if (again && object.map.H.isZero(0)) {
-      TryAgain(model_, history_, &object);
+      ReinitializeIfBetter(model_, history_, &object);
       object.is_stale = true;
     }
   }
 
-  // Whether no place of an object fits all its sights.  Of one that was told late the window may
-  // show nothing: its poses have followed it away.
+  // Whether no place of an object fits all its observations.  Of one that was told late the window
+  // may show nothing: its poses have followed it away.
   bool Misfits(const Object& object) const {
-    Vector9d anywhere = object.chart;
-    const double cost = Settle(model_, history_, object, kSettleIterations, &anywhere);
-    return 2 * cost > options_.loop_chi_square * 4 * static_cast<double>(object.sights.size());
+    Vector9d anywhere = object.center_shape;
+    const double cost = RefineObject(model_, history_, object, kRefineIterations, &anywhere);
+    return 2 * cost >
+           options_.loop_chi_square * 4 * static_cast<double>(object.observations.size());
   }
 
   StepReport Update() {
     StepReport report;
     const int end = num_poses();
     report.pose = end - 1;
-    report.first_sight = history_.steps.back().first_sight;
+    report.first_observation = history_.steps.back().first_observation;
     const int begin = std::max(end - options_.window_poses, FirstFree());
     if (begin >= end) return report;
-    report.linearized = KeepPast(model_, begin, &history_);
+    report.linearized = UpdateMarginalPriors(model_, begin, &history_);
     damping_ = std::min(damping_, kMostDamping);
-    const Work window =
-        region_.Minimize(&history_, begin, Past::kKept, options_.window_iterations, &damping_);
+    const WindowResult window = window_.Minimize(
+        &history_, begin, MarginalPriors::kKeep, options_.window_iterations, &damping_);
     report.window_poses = window.poses;
     report.window_objects = window.objects;
     report.linearized += window.linearized;
@@ -226,7 +231,7 @@ class SessionOf : public Session {
     if (schedule_.Recovers(fit)) StartYoungAgain(&report);
     const Smoothing smoothing = schedule_.Choose(fit);
     report.closed_loop = smoothing.closes_loop;
-    if (smoothing.begin < begin) SmoothRegion(smoothing, &report);
+    if (smoothing.begin < begin) SmoothWindow(smoothing, &report);
     return report;
   }
 
@@ -234,33 +239,34 @@ class SessionOf : public Session {
 
   void StartYoungAgain(StepReport* report) {
     const int begin = std::max(num_poses() - options_.recent_poses, FirstFree());
-    report->smoothed_sights += Recover(model_, begin, options_, &region_, &history_);
+    report->smoothed_observations += Recover(model_, begin, options_, &window_, &history_);
     report->smoothed_poses = num_poses() - begin;
     report->recovered = true;
     MarkStale(begin, &history_);
   }
 
-  // Objects in a wrong place are started again, and all is minimised once more.
-  void SmoothRegion(const Smoothing& smoothing, StepReport* report) {
+  // Objects in a wrong place are started again, and all is minimized once more.
+  void SmoothWindow(const Smoothing& smoothing, StepReport* report) {
     const int from = std::max(smoothing.begin, FirstFree());
     const int window_begin = num_poses() - report->window_poses;
     double damping = kFirstDamping;
     for (int round = 0; round < smoothing.rounds; ++round) {
-      const Work work =
+      const WindowResult result =
           round == 0 && smoothing.closes_loop
-              ? CloseLoop(model_, from, window_begin, options_, &region_, &history_)
-              : region_.Minimize(&history_, from, Past::kAnew, smoothing.iterations, &damping);
+              ? CloseLoop(model_, from, window_begin, options_, &window_, &history_)
+              : window_.Minimize(
+                    &history_, from, MarginalPriors::kRelinearize, smoothing.iterations, &damping);
       MarkStale(from, &history_);
-      schedule_.SmoothedWith(work.poses, work.front);
-      report->smoothed_poses = work.poses;
-      report->smoothed_sights += work.linearized;
+      schedule_.SmoothedWith(result.poses, result.front);
+      report->smoothed_poses = result.poses;
+      report->smoothed_observations += result.linearized;
       bool changed = false;
-      for (const int row : work.misfits) {
+      for (const int row : result.misfits) {
         Object& object = history_.objects[row];
         if (!object.map.H.isZero(0)) continue;
-        const Vector9d before = object.chart;
-        TryAgain(model_, history_, &object);
-        changed = changed || object.chart != before;
+        const Vector9d before = object.center_shape;
+        ReinitializeIfBetter(model_, history_, &object);
+        changed = changed || object.center_shape != before;
       }
       if (!changed) break;
     }
@@ -268,7 +274,7 @@ class SessionOf : public Session {
 
   OnlineOptions options_;
   Model model_;
-  Region<Pose> region_;
+  Window<Pose> window_;
   History<Pose> history_;
   Schedule schedule_;
   double damping_ = kFirstDamping;  // of the window

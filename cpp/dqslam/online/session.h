@@ -1,31 +1,31 @@
-// Estimation step by step: bounded work at each, an estimate at any time.
+// Estimation step by step: bounded result at each, an estimate at any time.
 //
-// At a step the last poses and the objects they saw are minimised, poses before them constant and
-// the sights from there kept as Gaussians on the objects.  Now and then more poses are, so that
-// nothing stays frozen where it was first put; an object that comes back after an absence, and does
-// not fit, frees all poses since it was seen last.
+// At a step the last poses and the objects they saw are minimized, poses before them constant and
+// the observations from there kept as Gaussians on the objects.  Now and then more poses are, so
+// that nothing stays frozen where it was first put; an object that comes back after an absence, and
+// does not fit, frees all poses since it was seen last.
 #pragma once
 
 #include <memory>
 
-#include "dqslam/graph.h"
+#include "dqslam/online/observations.h"
 #include "dqslam/online/options.h"
 #include "dqslam/online/relabel.h"
-#include "dqslam/online/sights.h"
+#include "dqslam/problem/graph.h"
 
 namespace dqslam::online {
 
 /// What a step cost.
 struct StepReport {
-  int pose = 0;             ///< row of the new pose
-  int first_sight = 0;      ///< row of the first it saw: boxes as they were given, then positions
-  int window_poses = 0;     ///< poses of the window
-  int window_objects = 0;   ///< objects that it saw
-  int linearized = 0;       ///< sights, in the window and to keep what lies before it
-  int undefined = 0;        ///< sights of the window whose objects are not in front
-  double chi_square = 0;    ///< of the window, per residual: 1 where the model is right
-  int smoothed_poses = 0;   ///< poses minimised beside the window; 0 at most steps
-  int smoothed_sights = 0;  ///< sights linearised there
+  int pose = 0;               ///< row of the new pose
+  int first_observation = 0;  ///< row of the first it saw: boxes as they were given, then positions
+  int window_poses = 0;       ///< poses of the window
+  int window_objects = 0;     ///< objects that it saw
+  int linearized = 0;         ///< observations, in the window and to keep what lies before it
+  int undefined = 0;          ///< observations of the window whose objects are not in front
+  double chi_square = 0;      ///< of the window, per residual: 1 where the model is right
+  int smoothed_poses = 0;     ///< poses minimized beside the window; 0 at most steps
+  int smoothed_observations = 0;  ///< observations linearized there
   bool closed_loop = false;
   bool recovered = false;  ///< young objects were started again
 };
@@ -43,7 +43,7 @@ class Session {
   /// where its covariance is empty.  Throws std::invalid_argument, and then nothing has changed.
   virtual StepReport Add(const Eigen::VectorXd& relative,
                          const RowMatrix& covariance,
-                         const NewSights& sights) = 0;
+                         const StepObservations& observations) = 0;
 
   /// An object of a map that is known: log-Cholesky parameters and their covariance (9, 9).
   virtual void AddMapObject(const Vector9d& ellipsoid,
@@ -65,8 +65,8 @@ class Session {
   /// rigidly with the last of these poses.
   virtual void Merge(const RowMatrix& poses, const RowMatrix& ellipsoids) = 0;
 
-  /// All of it as a problem for Solve(): objects without a sight take no part, and keep their row
-  /// in `rows`.
+  /// All of it as a problem for Solve(): objects without a observation take no part, and keep their
+  /// row in `rows`.
   virtual Graph ToGraph(std::vector<int>* rows) const = 0;
 
   virtual int num_poses() const = 0;

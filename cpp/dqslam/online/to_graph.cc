@@ -34,9 +34,9 @@ Graph ToGraph(const Model& model, const History<Pose>& history, std::vector<int>
   rows->clear();
   std::vector<int> row_of_object(objects, -1);
   for (int object = 0; object < objects; ++object) {
-    const std::vector<int>& own = history.objects[object].sights;
-    const bool has_box =
-        std::any_of(own.begin(), own.end(), [&](int row) { return history.sights[row].is_box; });
+    const std::vector<int>& own = history.objects[object].observations;
+    const bool has_box = std::any_of(
+        own.begin(), own.end(), [&](int row) { return history.observations[row].is_box; });
     if (!has_box) continue;
     row_of_object[object] = static_cast<int>(rows->size());
     rows->push_back(object);
@@ -47,12 +47,12 @@ Graph ToGraph(const Model& model, const History<Pose>& history, std::vector<int>
     graph.size_prior.log_mean[row] = history.objects[(*rows)[row]].size.log_mean;
     graph.size_prior.log_sigma[row] = history.objects[(*rows)[row]].size.log_sigma;
   }
-  const auto takes_part = [&](const Sight& sight) {
-    return !sight.Waits() && row_of_object[sight.object] >= 0;
+  const auto takes_part = [&](const Observation& observation) {
+    return !observation.Waits() && row_of_object[observation.object] >= 0;
   };
   int boxes = 0, positions = 0;
-  for (const Sight& sight : history.sights) {
-    if (takes_part(sight)) ++(sight.is_box ? boxes : positions);
+  for (const Observation& observation : history.observations) {
+    if (takes_part(observation)) ++(observation.is_box ? boxes : positions);
   }
   graph.boxes = {IndexVector(boxes),
                  IndexVector(boxes),
@@ -64,24 +64,24 @@ Graph ToGraph(const Model& model, const History<Pose>& history, std::vector<int>
                      RowMatrix(positions, 3),
                      RowMatrix(positions, 9)};
   boxes = positions = 0;
-  for (const Sight& sight : history.sights) {
-    if (!takes_part(sight)) continue;
-    const int object = row_of_object[sight.object];
-    if (sight.is_box) {
-      const Eigen::Matrix4d& W = sight.sqrt_information;
+  for (const Observation& observation : history.observations) {
+    if (!takes_part(observation)) continue;
+    const int object = row_of_object[observation.object];
+    if (observation.is_box) {
+      const Eigen::Matrix4d& W = observation.sqrt_information;
       const Eigen::Matrix4d covariance = (W.transpose() * W).inverse();
-      graph.boxes.pose[boxes] = sight.pose;
+      graph.boxes.pose[boxes] = observation.pose;
       graph.boxes.object[boxes] = object;
-      graph.boxes.box.row(boxes) = sight.value.transpose();
+      graph.boxes.box.row(boxes) = observation.value.transpose();
       graph.boxes.covariance.row(boxes) =
           Eigen::Map<const Eigen::Matrix<double, 1, 16>>(covariance.data());
-      graph.boxes.truncated.row(boxes++) = sight.truncated.transpose();
+      graph.boxes.truncated.row(boxes++) = observation.truncated.transpose();
     } else {
-      const Eigen::Matrix3d W = sight.sqrt_information.topLeftCorner<3, 3>();
+      const Eigen::Matrix3d W = observation.sqrt_information.topLeftCorner<3, 3>();
       const Eigen::Matrix3d covariance = (W.transpose() * W).inverse();
-      graph.positions.pose[positions] = sight.pose;
+      graph.positions.pose[positions] = observation.pose;
       graph.positions.object[positions] = object;
-      graph.positions.object_in_robot.row(positions) = sight.value.head<3>().transpose();
+      graph.positions.object_in_robot.row(positions) = observation.value.head<3>().transpose();
       graph.positions.covariance.row(positions++) =
           Eigen::Map<const Eigen::Matrix<double, 1, 9>>(covariance.data());
     }

@@ -13,7 +13,7 @@ from dqslam.cli.settings import ConfigFile
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from dqslam.ablation import AblationTable, Row
+    from dqslam.studies.ablation import AblationTable, Row
 
 
 def ablation(
@@ -32,9 +32,9 @@ def ablation(
 
     Writes ablation.json, ablation.png and config.toml.
     """
-    from dqslam.ablation import run_ablation
     from dqslam.plot.ablation import plot_ablation
-    from dqslam.scenario import load_scenario
+    from dqslam.simulation.scenario import load_scenario
+    from dqslam.studies.ablation import run_ablation
 
     output = Output(quiet=quiet, as_json=json)
     with results_directory(out), output.trials(trials) as progress:

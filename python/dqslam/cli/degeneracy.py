@@ -12,7 +12,7 @@ from dqslam.cli.settings import ConfigFile
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from dqslam.degeneracy import DegeneracyTable
+    from dqslam.studies.degeneracy import DegeneracyTable
 
 
 def degeneracy(
@@ -28,8 +28,8 @@ def degeneracy(
 
     Writes degeneracy.json, degeneracy.png and config.toml.
     """
-    from dqslam.degeneracy import run_degeneracy
     from dqslam.plot.degeneracy import plot_degeneracy
+    from dqslam.studies.degeneracy import run_degeneracy
 
     output = Output(quiet=quiet, as_json=json)
     with results_directory(out), output.trials(trials) as progress:
@@ -45,7 +45,7 @@ def _results(table: "DegeneracyTable") -> "Table":
 
     shown = Table(title=f"{table.trials} objects a motion, poses known", box=SIMPLE_HEAD)
     shown.add_column("estimator, start", no_wrap=True)
-    for heading in ("converged", "ellipsoids", "centre, m: 25 %", "median", "75 %"):
+    for heading in ("converged", "ellipsoids", "center, m: 25 %", "median", "75 %"):
         shown.add_column(heading, justify="right", no_wrap=True)
     for motion in table.motions:
         weakest = ", ".join(f"{value:.0e}" for value in motion.singular_values[-3:])

@@ -16,9 +16,9 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from dqslam.estimate import Estimate
-    from dqslam.evaluate import Report
+    from dqslam.metrics import Report
     from dqslam.recording import Detections, Truth
-    from dqslam.scenario import Scenario
+    from dqslam.simulation.scenario import Scenario
 
 
 class _Drive(NamedTuple):
@@ -46,7 +46,7 @@ def demo(
     """
     from dqslam import io
     from dqslam.plot import plot_maps
-    from dqslam.scenario import load_scenario
+    from dqslam.simulation.scenario import load_scenario
 
     output = Output(quiet=quiet, as_json=json)
     scenario = load_scenario("paper")
@@ -69,9 +69,9 @@ def demo(
 
 
 def _drive(scenario: "Scenario", seed: int) -> _Drive:
-    from dqslam.evaluate import evaluate
-    from dqslam.problem import build_graph, solve
-    from dqslam.simulate import simulate
+    from dqslam.graph import build_graph, solve
+    from dqslam.metrics import evaluate
+    from dqslam.simulation.simulator import simulate
 
     recording, truth = simulate(scenario, seed=seed)
     start = time.perf_counter()
@@ -98,8 +98,8 @@ def _table(drives: list[_Drive]) -> "Table":
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
-    shown = Table(title="mean errors in metres, the same start", box=SIMPLE_HEAD)
-    for heading in ("seed", "poses", "boxes", "objects", "odometry", "estimate", "centres", "s"):
+    shown = Table(title="mean errors in meters, the same start", box=SIMPLE_HEAD)
+    for heading in ("seed", "poses", "boxes", "objects", "odometry", "estimate", "centers", "s"):
         shown.add_column(heading, justify="right")
     for drive in drives:
         row = _row(drive)

@@ -24,10 +24,10 @@ def evaluate(
         typer.Option(help="Motion between both worlds to remove: rigid, with scale, on the plane."),
     ] = "se3",
     rpe_delta: Annotated[
-        float, typer.Option(help="Frames or metres over which the relative pose error is taken.")
+        float, typer.Option(help="Frames or meters over which the relative pose error is taken.")
     ] = 1.0,
     rpe_unit: Annotated[
-        Literal["frames", "metres"], typer.Option(help="What --rpe-delta counts.")
+        Literal["frames", "meters"], typer.Option(help="What --rpe-delta counts.")
     ] = "frames",
     objects: Annotated[
         Path | None, typer.Option(help="CSV of true objects: x,y,z,class_name,sx,sy,sz,...")
@@ -38,7 +38,7 @@ def evaluate(
     gate: Annotated[
         float | None,
         typer.Option(
-            help="Metres within which a nearest one counts. Default: the object's longest side, "
+            help="Meters within which a nearest one counts. Default: the object's longest side, "
             "1 m where sizes are unknown."
         ),
     ] = None,
@@ -60,7 +60,7 @@ def evaluate(
     what each number is.
     """
     from dqslam import io
-    from dqslam.evaluate_results import evaluate_results
+    from dqslam.evaluation import evaluate_results
 
     if gate is not None and not gate > 0.0:
         raise ValueError(f"--gate: {gate:g} is not positive")
@@ -147,7 +147,7 @@ def _boxes_and_objects(evaluation: dict[str, Any]) -> "Table":
     how += " and class" if objects["by_class"] else ""
     table.add_row("objects", f"{counts}, by {how}; {objects['moving_in_map']} in the map move")
     rows = (
-        ("centres, m", "center", ("median", "mean", "max")),
+        ("centers, m", "center", ("median", "mean", "max")),
         ("sizes, relative", "size_relative", ("median", "mean", "max")),
         ("volume, ratio", "volume_ratio", ("median",)),
         ("orientation, deg", "orientation_deg", ("median", "mean", "max")),
@@ -166,7 +166,7 @@ def _pairs(pairs: list[dict[str, Any]]) -> "Table":
 
     names = ("center", "size_relative", "volume_ratio", "orientation_deg", "iou_3d")
     table = Table(box=SIMPLE_HEAD)
-    for heading in ("id", "true id", "class", "centre, m", "size", "volume", "turn, deg", "IoU"):
+    for heading in ("id", "true id", "class", "center, m", "size", "volume", "turn, deg", "IoU"):
         table.add_column(heading, justify="left" if heading == "class" else "right")
     for pair in pairs:
         true_id = "" if pair["true_id"] is None else str(pair["true_id"])

@@ -19,7 +19,7 @@ from dqslam.cli.settings import ConfigFile
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from dqslam.inspect_recording import Inspection
+    from dqslam.inspection import Inspection
 
 MOST_LISTED = 8
 FOUND = 3  # exit code of --strict
@@ -50,7 +50,7 @@ def inspect(
     distortion is missing, clocks that do not meet: each by a check that compares two readings.
     """
     from dqslam import io
-    from dqslam.inspect_recording import inspect_recording
+    from dqslam.inspection import inspect_recording
 
     output = Output(quiet=quiet, as_json=json)
     names = io.split_formats(formats or [])

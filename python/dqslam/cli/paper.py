@@ -13,7 +13,7 @@ from dqslam.cli.settings import CONFIG, ConfigFile, save_settings
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from dqslam.experiment import PaperTable, RowName, Statistics
+    from dqslam.studies.paper import PaperTable, RowName, Statistics
 
 ROWS: "dict[RowName, str]" = {
     "monocular": "monocular",
@@ -21,7 +21,7 @@ ROWS: "dict[RowName, str]" = {
 }
 METRICS = {
     "rmse_pos": "positions, m",
-    "rmse_landmark": "objects' centres, m",
+    "rmse_landmark": "objects' centers, m",
     "rmse_volume": "objects' volumes, m\u00b3",
 }
 SCORES = {
@@ -29,13 +29,13 @@ SCORES = {
     "anees": "NEES of last pose",
     "anees_poses": "NEES of all poses",
     "anees_interval": "  95 % interval",
-    "anees_objects": "NEES of centres",
+    "anees_objects": "NEES of centers",
     "anees_objects_interval": "  95 % interval",
     "optimum_rate": "share at optimum",
     "inlier_precision": "inliers, precision",
     "inlier_recall": "inliers, recall",
     "oracle_rmse_pos": "told ids: positions",
-    "oracle_rmse_landmark": "told ids: centres",
+    "oracle_rmse_landmark": "told ids: centers",
     "objects_dropped": "objects left out",
 }
 EXAMPLES = 6  # maps drawn, as in the paper's figure
@@ -95,8 +95,8 @@ def paper(
 
     Writes table.json, maps.png with six of the trials, and config.toml.
     """
-    from dqslam.experiment import run_paper
-    from dqslam.scenario import load_scenario
+    from dqslam.simulation.scenario import load_scenario
+    from dqslam.studies.paper import run_paper
 
     chosen = load_scenario(scenario)
     wrong = {
@@ -139,7 +139,7 @@ def _results(table: "PaperTable") -> "Table":
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
-    from dqslam.experiment import PAPER_ODOMETRY, PAPER_ROWS
+    from dqslam.studies.paper import PAPER_ODOMETRY, PAPER_ROWS
 
     shown = Table(
         title=f"{table.scenario.name}, seeds {table.seeds[0]} to {table.seeds[-1]}, "
@@ -212,8 +212,8 @@ def _score_cells(score: "float | list[float] | dict[str, float]") -> list[str]:
 
 
 def _draw(table: "PaperTable", path: Path, output: Output) -> None:
-    from dqslam.experiment import example_maps
     from dqslam.plot import plot_maps
+    from dqslam.studies.paper import example_maps
 
     maps = example_maps(table, EXAMPLES)
     if not maps:

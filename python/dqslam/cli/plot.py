@@ -183,7 +183,7 @@ def _overlay(
     output: Output,
 ) -> list[Path]:
     """Write images, by their poses, with what the map has of them: the files."""
-    from dqslam.evaluate_results import fit_boxes
+    from dqslam.evaluation import fit_boxes
     from dqslam.plot.overlay import Overlay, save_stills, save_video, usual_rate
 
     overlay = Overlay(results, None if results.boxes is None else fit_boxes(results))

@@ -24,8 +24,8 @@ from dqslam.cli.run_tables import show_report
 from dqslam.cli.settings import CONFIG, ConfigFile, save_settings
 
 if TYPE_CHECKING:
-    from dqslam.io import OdometryNoise
-    from dqslam.run_recording import RunResult
+    from dqslam.assumptions import OdometryNoise
+    from dqslam.pipeline import RunResult
 
 NOISE = "translation=0.02,rotation=0.01"
 
@@ -111,9 +111,9 @@ def run(
     Writes trajectory.txt, odometry.txt (what it started from), map.json, boxes.csv, camera.json,
     report.json and config.toml.
     """
-    from dqslam import _core, io, run_recording
-    from dqslam.associate import FINAL, UNSURE
-    from dqslam.size_prior import load_size_priors
+    from dqslam import _core, io, pipeline
+    from dqslam.association import FINAL, UNSURE
+    from dqslam.assumptions import load_size_priors
 
     sizes = None if size_priors is None else load_size_priors(size_priors)
     added = parse_noise("--perturb-odometry", perturb_odometry)
@@ -155,11 +155,9 @@ def run(
             frames=frames,
         )
         if added is not None:
-            recording = run_recording.perturb_odometry(
-                recording, added, seed=seed, believed=believed
-            )
+            recording = pipeline.perturb_odometry(recording, added, seed=seed, believed=believed)
         if online:
-            from dqslam.online.run import describe_step, run_online
+            from dqslam.pipeline.online import describe_step, run_online
 
             result = run_online(
                 recording,
@@ -167,7 +165,7 @@ def run(
                 **how,
             )
         else:
-            result = run_recording.run(
+            result = pipeline.run(
                 recording, mode=_core.Mode[mode.upper()], progress=progress, **how
             )
     report = {
@@ -213,7 +211,7 @@ def _progress(output: Output, *, online: bool) -> AbstractContextManager[Callabl
 
 def parse_noise(option: str, text: str | None) -> "OdometryNoise | None":
     """Read "translation=0.02,rotation=0.01", both needed, None of None."""
-    from dqslam.io import OdometryNoise
+    from dqslam.assumptions import OdometryNoise
 
     if text is None:
         return None

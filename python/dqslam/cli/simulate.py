@@ -38,8 +38,8 @@ def simulate(
     from dqslam import io
     from dqslam._files import write_text
     from dqslam.config import toml_text
-    from dqslam.scenario import load_scenario
-    from dqslam.simulate import simulate
+    from dqslam.simulation.scenario import load_scenario
+    from dqslam.simulation.simulator import simulate
 
     output = Output(quiet=quiet, as_json=json)
     chosen = load_scenario(scenario)

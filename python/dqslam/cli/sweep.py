@@ -14,7 +14,7 @@ from dqslam.cli.settings import CONFIG, ConfigFile, save_settings
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from dqslam.sweep import CellSummary, SweepSummary
+    from dqslam.studies.sweep import CellSummary, SweepSummary
 
 NAMED = 5  # failures of one kind that are named
 
@@ -39,7 +39,7 @@ def sweep(
     file, and config.toml.
     """
     from dqslam._files import read_text, write_text
-    from dqslam.sweep import load_sweep, run_sweep
+    from dqslam.studies.sweep import load_sweep, run_sweep
 
     asked = load_sweep(file)
     output = Output(quiet=quiet, as_json=json)
@@ -76,7 +76,7 @@ def _table(summary: "SweepSummary") -> "Table":
     for heading in ("positions, m\nmean", "\nmedian"):
         shown.add_column(heading, justify="right", min_width=13)
     bound_heading = ["error/bound\nmean"] if has_bound else []
-    for heading in ("centres, m\nmean", *bound_heading, "\nfailed"):
+    for heading in ("centers, m\nmean", *bound_heading, "\nfailed"):
         shown.add_column(heading, justify="right")
     for cell in summary.cells:
         positions = cell.metrics.get("rmse_pos")

@@ -18,7 +18,6 @@ from dqslam.io.images import find_images as find_images
 from dqslam.io.mount import read_mount as read_mount
 from dqslam.io.ply import write_ply as write_ply
 from dqslam.io.recording import Dropped as Dropped
-from dqslam.io.recording import OdometryNoise as OdometryNoise
 from dqslam.io.recording import load_recording as load_recording
 from dqslam.io.recording import nearest_pose as nearest_pose
 from dqslam.io.results import BoxTable as BoxTable

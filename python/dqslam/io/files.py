@@ -51,7 +51,7 @@ def parse_integers(
 ) -> NDArray[np.int64]:
     """Turn the cells of one column into whole numbers, shape (n,); "5.0" is one."""
     values = parse_numbers(path, name, cells, lines)
-    # Beyond 2^53 a float cannot tell neighbouring integers apart.
+    # Beyond 2^53 a float cannot tell neighboring integers apart.
     bad = np.flatnonzero((values != np.floor(values)) | (np.abs(values) >= 2.0**53))
     if bad.size:
         raise FileError(

@@ -21,7 +21,7 @@ def tell_nobody(share: float) -> None:
 
 @dataclass(frozen=True)
 class Look:
-    """What a format is recognised by: the path, and the first line that is no comment."""
+    """What a format is recognized by: the path, and the first line that is no comment."""
 
     path: Path
     first: str  #: "" where the path is a folder, or no text
@@ -37,8 +37,8 @@ class Format(Generic[Content]):
     """One file format of cameras, trajectories or detections."""
 
     name: str
-    looks: str  #: what it is recognised by, in words
-    recognise: Callable[[Look], bool]
+    looks: str  #: what it is recognized by, in words
+    recognize: Callable[[Look], bool]
     read: Callable[..., Content]
     write: Callable[..., None] | None = None
     needs_times: bool = True  #: else a file may count frames, and have no times
@@ -64,7 +64,7 @@ def choose_format(
         return named_format(name, formats, kind)
     look = look_at(path)
     for format_ in formats:
-        if format_.recognise(look):
+        if format_.recognize(look):
             return format_
     if look.path.is_dir():
         raise FileError(path, "cannot be read: Is a directory")

@@ -1,4 +1,4 @@
-"""How the camera sits in the body whose trajectory is given: body_from_camera, metres.
+"""How the camera sits in the body whose trajectory is given: body_from_camera, meters.
 
 A text of 7 numbers ``tx ty tz qx qy qz qw``, or of the 12 or 16 of a matrix [R t], row by row, with
 spaces, commas or brackets between; or the ``T_BS`` of EuRoC's camera ``sensor.yaml``.

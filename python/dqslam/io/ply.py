@@ -1,6 +1,6 @@
 """A map as PLY, for MeshLab, CloudCompare, Blender and trimesh.
 
-Vertices ``x y z`` [m] in the world of the map, coloured, with the ``object_id`` they belong to, -1
+Vertices ``x y z`` [m] in the world of the map, colored, with the ``object_id`` they belong to, -1
 for the trajectory. Ellipsoids are faces, what is no ellipsoid is one vertex, and the trajectory is
 its positions with an ``edge`` from each to the next.
 """
@@ -73,7 +73,7 @@ def _lines(
     bodies = [_body(results, row, sphere) for row in range(len(objects))]
     meshed = int(objects.is_ellipsoid.sum())
     yield (
-        "ply\nformat ascii 1.0\ncomment a map by dqslam, metres\n"
+        "ply\nformat ascii 1.0\ncomment a map by dqslam, meters\n"
         f"element vertex {sum(map(len, bodies)) + len(path)}\n"
         "property double x\nproperty double y\nproperty double z\n"
         "property uchar red\nproperty uchar green\nproperty uchar blue\n"
@@ -94,7 +94,7 @@ def _lines(
 
 
 def _body(results: Results, row: int, sphere: Floats) -> Floats:
-    """Return the vertices of an object, (v, 3); its centre alone where it is no ellipsoid."""
+    """Return the vertices of an object, (v, 3); its center alone where it is no ellipsoid."""
     from scipy.spatial.transform import Rotation
 
     objects = results.objects

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dqslam import _core
+from dqslam.assumptions import OdometryNoise
 from dqslam.io.camera import read_camera
 from dqslam.io.detections import DetectionTable, read_detections
 from dqslam.io.files import FileError
@@ -21,32 +22,8 @@ from dqslam.recording import Detections, Odometry, Recording
 
 # Two boxes do not tell an object's distance from its size when the path is noisy.
 FEWEST_BOXES = 3
-# Odometry outside of this is exact or worthless, and squares badly.
-SIGMAS = (1e-9, 1e6)
 
 Ids = Literal["none", "track_id", "class_id"]
-
-
-@dataclass(frozen=True)
-class OdometryNoise:
-    """Standard deviations of one step of odometry, each axis: metres and radians."""
-
-    translation_m: float = 0.01
-    rotation_rad: float = 0.005
-
-    def __post_init__(self) -> None:
-        """Refuse what is no standard deviation."""
-        for name, sigma in (("translation", self.translation_m), ("rotation", self.rotation_rad)):
-            if not SIGMAS[0] <= sigma <= SIGMAS[1]:
-                raise ValueError(
-                    f"odometry noise: {name} is {sigma:g}, not between "
-                    f"{SIGMAS[0]:g} and {SIGMAS[1]:g}"
-                )
-
-    def covariance(self, steps: int) -> NDArray[np.float64]:
-        """Repeat the covariance of a step, translation first: shape (steps, 6, 6)."""
-        variance = np.repeat([self.translation_m**2, self.rotation_rad**2], 3)
-        return np.tile(np.diag(variance), (steps, 1, 1))
 
 
 @dataclass(frozen=True)

@@ -95,7 +95,7 @@ def kind_of(path: str | Path) -> str | None:
         ("trajectory", TRAJECTORY_FORMATS),
         ("detections", DETECTION_FORMATS),
     ):
-        if any(format_.recognise(look) for format_ in formats):
+        if any(format_.recognize(look) for format_ in formats):
             return kind
     if look.path.is_file():
         read_rows(path)  # names what is wrong: empty, comments only, or no text

@@ -7,11 +7,11 @@ Objects, a row each; columns by name, in any order, others ignored; # starts a c
 ``class_name`` (or ``class``)
     Optional.
 ``x y z`` (or ``tx ty tz``, ``cx cy cz``)
-    Centre in the world, metres.
+    Center in the world, meters.
 ``qx qy qz qw``, or ``yaw``
     world_from_object, optional; ``yaw`` [rad] turns about the z axis of the world.
 ``sx sy sz`` (or ``size_x size_y size_z``)
-    Full sizes along the object's own axes, metres, optional.
+    Full sizes along the object's own axes, meters, optional.
 ``length height width``
     In their place, KITTI's: sizes along x, y (down) and z, and ``yaw`` turns about the y axis.
 ``static``
@@ -54,11 +54,11 @@ class TrueObjects:
     class_name: tuple[str, ...] | None
     """One per object."""
     center: Floats
-    """In the world, metres, shape (t, 3)."""
+    """In the world, meters, shape (t, 3)."""
     rotation: Floats | None
     """world_from_object, shape (t, 3, 3)."""
     size: Floats | None
-    """Full sizes along the object's own axes, metres, shape (t, 3)."""
+    """Full sizes along the object's own axes, meters, shape (t, 3)."""
     static: Bools
     """Whether it stands still, shape (t,); all do when the file does not say."""
 

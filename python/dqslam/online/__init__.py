@@ -3,7 +3,7 @@
 from dqslam._core import OnlineOptions as OnlineOptions
 from dqslam.online.objects import Objects as Objects
 from dqslam.online.polish import Polished as Polished
-from dqslam.online.relocalise import Relocation as Relocation
+from dqslam.online.relocalize import Relocation as Relocation
 from dqslam.online.replay import Frame as Frame
 from dqslam.online.replay import replay as replay
 from dqslam.online.replay import steps_of as steps_of

@@ -14,22 +14,27 @@ import numpy as np
 
 from dqslam import _core
 from dqslam._checks import Bools, Floats, Ints
-from dqslam.associate import FINAL
-from dqslam.associate.follow import FIRST_NOISE, Follower
-from dqslam.associate.judge import find_misfits, find_movers, find_scattered, join_duplicates
-from dqslam.associate.keyframes import KeyframeChooser
-from dqslam.associate.rays import rays_of_boxes
-from dqslam.associate.refine import assign_afterwards
-from dqslam.associate.tracklets import Linker
-from dqslam.online.journal import Journal, Keyframe
-from dqslam.online.leg import Leg
+from dqslam.association import FINAL
+from dqslam.association.consistency import (
+    find_misfits,
+    find_movers,
+    find_scattered,
+    join_duplicates,
+)
+from dqslam.association.follow import FIRST_NOISE, Follower
+from dqslam.association.keyframes import KeyframeChooser
+from dqslam.association.rays import rays_of_boxes
+from dqslam.association.refine import assign_afterwards
+from dqslam.association.tracklets import Linker
+from dqslam.online.integrated_odometry import Leg
+from dqslam.online.keyframes import Journal, Keyframe
+from dqslam.online.local_map import Assumptions, Part, cut_part
+from dqslam.online.look_back import Reach
 from dqslam.online.objects import Registry
-from dqslam.online.part import Assumptions, Part, cut_part
-from dqslam.online.reach import Reach
 from dqslam.online.refinement import Refinement
 from dqslam.online.tell import tell
 
-# Keyframes whose poses are minimised when the boxes of the last one have found their objects.
+# Keyframes whose poses are minimized when the boxes of the last one have found their objects.
 RECENT = 10
 ITERATIONS = 2
 # The boxes of a keyframe are assigned again when there are so many newer ones.
@@ -221,7 +226,7 @@ class Identifier:
             scene.estimate_noise()
 
     def _has_departed(self, number: int) -> bool:
-        """Tell whether an object has gone out of view since the last judgement."""
+        """Tell whether an object has gone out of view since the last judgment."""
         seen = self._journal.keyframes_of(number)
         absent = len(self._journal.keyframes) - 1 - seen[-1] if seen else 0
         return DEPARTED <= absent < DEPARTED + JUDGE_EVERY

@@ -9,9 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from dqslam import _core
 from dqslam._checks import Floats, as_covariances
+from dqslam.assumptions import BoxNoise
 from dqslam.online.objects import Registry
 from dqslam.online.step import Motion, StepPositions
-from dqslam.problem import BoxNoise
 from dqslam.recording import as_poses, pose_size, tangent_size
 
 Int32s = NDArray[np.int32]

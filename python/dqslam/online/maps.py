@@ -17,7 +17,7 @@ from dqslam.io import FileError, load_results, save_estimate
 if TYPE_CHECKING:
     from dqslam.online.slam import OnlineSlam
 
-# Where a result says nothing of its uncertainty: sigma of the centre [m] and of the log axes.
+# Where a result says nothing of its uncertainty: sigma of the center [m] and of the log axes.
 _CENTER_SIGMA_M, _LOG_SIGMA = 0.05, 0.1
 _STEP = 1e-6
 
@@ -48,7 +48,7 @@ class _Covariances:
 def load_map(directory: str | Path) -> KnownMap:
     """Read the objects of a result that are ellipsoids, and how uncertain they are.
 
-    A result has the covariance of the centre and the sigmas of the log semi-axes; the orientation
+    A result has the covariance of the center and the sigmas of the log semi-axes; the orientation
     is taken to be known as well as the axes differ.
     """
     results = load_results(directory)

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from dqslam._checks import Floats, Ints
-from dqslam.size_prior import SizePrior, SizePriors
+from dqslam.assumptions import SizePrior, SizePriors
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,7 +19,7 @@ class Objects:
     class_names: tuple[str, ...]
     """One per object: the class most of its boxes have."""
     ellipsoids: Floats
-    """Centre and log-Cholesky shape, shape (o, 9)."""
+    """Center and log-Cholesky shape, shape (o, 9)."""
     observations: Ints
     """Boxes per object in this session, shape (o,)."""
 
@@ -29,7 +29,7 @@ class Objects:
 
     @property
     def centers(self) -> Floats:
-        """In the world, metres, shape (o, 3)."""
+        """In the world, meters, shape (o, 3)."""
         return self.ellipsoids[:, :3]
 
 

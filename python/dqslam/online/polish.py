@@ -85,7 +85,7 @@ class Solve:
 class Smoothing:
     """All poses of a session that continues a map.
 
-    The map's objects are Gaussian priors, which ``solve`` has not; the session's own minimisation
+    The map's objects are Gaussian priors, which ``solve`` has not; the session's own minimization
     has them.
     """
 
@@ -95,7 +95,7 @@ class Smoothing:
         self._copy = session.clone()
 
     def work(self) -> Polished:
-        """Minimise all poses of the copy."""
+        """Minimize all poses of the copy."""
         copy = self._copy
         cost, count = copy.smooth(_ITERATIONS), copy.num_objects
         return Polished(copy.poses, count, list(range(count)), copy.ellipsoids, cost, None)

@@ -6,14 +6,14 @@ import numpy as np
 
 from dqslam import _core
 from dqslam._checks import Floats, Ints
-from dqslam.associate import FINAL
-from dqslam.associate.follow import Follower
-from dqslam.associate.refine import refine
-from dqslam.associate.scene_map import SceneMap
-from dqslam.associate.thinning import bend_path
-from dqslam.online.journal import Journal
+from dqslam.association import FINAL
+from dqslam.association.follow import Follower
+from dqslam.association.refine import refine
+from dqslam.association.scene_map import SceneMap
+from dqslam.association.thinning import bend_path
+from dqslam.online.keyframes import Journal
+from dqslam.online.local_map import Part
 from dqslam.online.objects import Registry
-from dqslam.online.part import Part
 from dqslam.online.polish import NOTHING, Polished, polished
 from dqslam.online.tell import noise_ratio, priors_of, relabel, tell
 

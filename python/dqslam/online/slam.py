@@ -11,16 +11,16 @@ from numpy.typing import ArrayLike
 
 from dqslam import _core
 from dqslam._checks import Floats, Ints
-from dqslam.associate import FINAL, UNSURE
+from dqslam.association import FINAL, UNSURE
+from dqslam.assumptions import BoxNoise, OdometryNoise, SizePrior, SizePriors
 from dqslam.estimate import Estimate
-from dqslam.io import OdometryNoise
 from dqslam.online.identify import Identifier, NewBoxes
 from dqslam.online.inputs import PathBegin, box_noise_rows, motion_arrays, next_time, position_rows
-from dqslam.online.journal import Journal
+from dqslam.online.keyframes import Journal
+from dqslam.online.local_map import Assumptions
 from dqslam.online.objects import Objects, Registry
-from dqslam.online.part import Assumptions
 from dqslam.online.polish import Polish, Polished, Polisher, Smoothing, Solve
-from dqslam.online.relocalise import Relocation, relocalise
+from dqslam.online.relocalize import Relocation, relocalize
 from dqslam.online.step import (
     CheckedBoxes,
     Motion,
@@ -29,8 +29,6 @@ from dqslam.online.step import (
     StepPositions,
     check_boxes,
 )
-from dqslam.problem import BoxNoise
-from dqslam.size_prior import SizePrior, SizePriors
 
 _NO_FLOATS = np.zeros(0)
 
@@ -49,7 +47,7 @@ class OnlineSlam:
     options
         Of the solver: its loss is that of ``polish``, and any but ``NONE`` makes the steps robust.
     online
-        Of the steps: how many poses are minimised, and when.
+        Of the steps: how many poses are minimized, and when.
     pose_model
         SE2 or SE3.
     first_pose, first_covariance
@@ -190,7 +188,7 @@ class OnlineSlam:
             self._identifier.go_on(relative, covariance)
         if len(ids) < len(objects):
             unknown = np.flatnonzero(objects < 0)
-            objects[unknown] = self._identify(checked, unknown, report.first_sight)
+            objects[unknown] = self._identify(checked, unknown, report.first_observation)
             names_of = self._registry.ids
             self.shown = np.array(
                 [names_of[row] if row >= 0 else -1 for row in objects.tolist()], dtype=np.int64
@@ -205,7 +203,7 @@ class OnlineSlam:
         axes = (2, 1) if self.pose_model == _core.PoseModel.SE2 else (3, 3)
         return np.diag(np.repeat([noise.translation_m**2, noise.rotation_rad**2], axes))
 
-    def _identify(self, boxes: CheckedBoxes, rows: Ints, first_sight: int) -> Ints:
+    def _identify(self, boxes: CheckedBoxes, rows: Ints, first_observation: int) -> Ints:
         """Return the rows of the objects that boxes show, -1 for none, shape (b,)."""
         return self._identifier.look(
             self._session,
@@ -213,7 +211,7 @@ class OnlineSlam:
             self._timestamps[-1],
             NewBoxes(
                 row=rows,
-                sight=first_sight + rows,
+                sight=first_observation + rows,
                 box=boxes.box[rows],
                 truncated=boxes.truncated[rows],
                 class_name=[boxes.class_name[row] for row in rows.tolist()],
@@ -321,7 +319,7 @@ class OnlineSlam:
     # ------------------------------------------------------------------------------ polish
 
     def polish(self, *, background: bool = False) -> Future[Polished]:
-        """Minimise all that has arrived, as ``solve`` does, from where the session stands.
+        """Minimize all that has arrived, as ``solve`` does, from where the session stands.
 
         In the background, the result is merged at the first ``add`` after it is done: what arrived
         meanwhile moves along rigidly. ``result()`` of what is returned waits for it. Without steps
@@ -339,7 +337,7 @@ class OnlineSlam:
 
     # ------------------------------------------------------------------------------ maps
 
-    def relocalise(self, boxes: StepBoxes) -> Relocation:
+    def relocalize(self, boxes: StepBoxes) -> Relocation:
         """Find the pose from which boxes of known objects, or classes, were seen.
 
         Raises
@@ -350,7 +348,7 @@ class OnlineSlam:
         checked = check_boxes(boxes)
         covariances = self._covariances()
         rows = enumerate(self._rows())
-        return relocalise(
+        return relocalize(
             self.camera,
             self.pose_model,
             self.objects,
@@ -413,7 +411,7 @@ class OnlineSlam:
         if first_boxes is not None and first_pose is None:
             probe = cls(camera, pose_model=pose_model, box_noise=box_noise, size_prior=size_prior)
             probe._add_map(known)
-            found = probe.relocalise(first_boxes)
+            found = probe.relocalize(first_boxes)
             first_pose, first_covariance = found.pose, found.covariance
             first_boxes = found.with_ids(first_boxes)
         slam = cls(

@@ -39,14 +39,14 @@ class StepBoxes:
 
 @dataclass(frozen=True, eq=False)
 class StepPositions:
-    """Measured centres of objects that boxes have shown, as a depth camera gives them."""
+    """Measured centers of objects that boxes have shown, as a depth camera gives them."""
 
     object_id: ArrayLike
     """Shape (p,)."""
     object_in_robot: ArrayLike
-    """Metres, shape (p, 3)."""
+    """Meters, shape (p, 3)."""
     covariance: ArrayLike
-    """Square metres, shape (p, 3, 3)."""
+    """Square meters, shape (p, 3, 3)."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,12 +9,11 @@ import numpy as np
 
 from dqslam import _core
 from dqslam._checks import Floats
-from dqslam.associate.scene_map import SceneMap
-from dqslam.io import OdometryNoise
-from dqslam.online.journal import Journal
+from dqslam.association.scene_map import SceneMap
+from dqslam.assumptions import OdometryNoise, SizePrior
+from dqslam.online.keyframes import Journal
+from dqslam.online.local_map import Part
 from dqslam.online.objects import Registry
-from dqslam.online.part import Part
-from dqslam.size_prior import SizePrior
 
 _T = TypeVar("_T")
 

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dqslam._checks import Floats
-from dqslam.ablation import WRONG_KINDS, WRONG_SHARE, AblationTable, Row
 from dqslam.plot.style import BLUE, VERMILLION, new_figure, save_figure
+from dqslam.studies.ablation import WRONG_KINDS, WRONG_SHARE, AblationTable, Row
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

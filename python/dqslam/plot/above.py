@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dqslam._checks import Floats
-from dqslam.evaluate import up_direction
+from dqslam.metrics import up_direction
 
 CIRCLE = np.stack([f(np.linspace(0.0, 2.0 * np.pi, 73)) for f in (np.cos, np.sin)])
 _NAMES = ("x", "y", "z")
@@ -32,7 +32,7 @@ class FromAbove:
 
 
 def outline(center: Floats, shape: Floats) -> Floats:
-    """Return the outline (2, n) of an ellipse of centre (2,) and shape (2, 2), perhaps flat."""
+    """Return the outline (2, n) of an ellipse of center (2,) and shape (2, 2), perhaps flat."""
     squares, along = np.linalg.eigh(shape)
     return np.asarray(center[:, None] + along * np.sqrt(squares.clip(min=0.0)) @ CIRCLE)
 

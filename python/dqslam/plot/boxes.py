@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dqslam.evaluate_results import BoxFits
+from dqslam.evaluation import BoxFits
 from dqslam.io import Results
 from dqslam.plot.frame import draw_boxes, rectangle, visible_outlines
 from dqslam.plot.labels import place_labels

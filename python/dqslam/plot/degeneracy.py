@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dqslam.degeneracy import ESTIMATORS, STARTS, DegeneracyTable
 from dqslam.plot.style import (
     BLUE,
     GREEN,
@@ -15,6 +14,7 @@ from dqslam.plot.style import (
     new_figure,
     save_figure,
 )
+from dqslam.studies.degeneracy import ESTIMATORS, STARTS, DegeneracyTable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -70,7 +70,7 @@ def _draw_errors(axes: "Axes", table: DegeneracyTable) -> None:
     axes.set_yscale("log")
     axes.set_ylim(top=1e8)  # what is further off is lost, however far
     axes.set_xticks(range(len(names)), [name.replace(", ", ",\n") for name in names])
-    axes.set_ylabel("error of the object's centre [m]")
+    axes.set_ylabel("error of the object's center [m]")
     axes.set_title(f"Median and quartiles of {table.trials} objects, poses known", fontsize=10)
     axes.grid(alpha=0.25, linewidth=0.5, axis="y")
     axes.legend(frameon=False, fontsize=9, loc="upper right")

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from dqslam._checks import Floats
-from dqslam.evaluate_results import PoseErrors
+from dqslam.evaluation import PoseErrors
 from dqslam.plot.gaps import break_at_gaps
 from dqslam.plot.style import (
     COLUMN_INCHES,

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dqslam._checks import Bools, Floats, Ints
-from dqslam.evaluate import boxes_through_lens, project_outlines, through_lens
-from dqslam.evaluate_results import BoxFits
+from dqslam.evaluation import BoxFits
 from dqslam.io import Results
+from dqslam.metrics import boxes_through_lens, project_outlines, through_lens
 from dqslam.plot.style import GREY
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ def draw_boxes(
 ) -> Ints:
     """Draw what the detector saw from a pose, and return the rows of the objects that it shows.
 
-    ``lens`` says that the pixels are those of the image as recorded; ``unmapped`` is the colour of
+    ``lens`` says that the pixels are those of the image as recorded; ``unmapped`` is the color of
     boxes of no object of the map. Those held out are dotted.
     """
     rows = np.flatnonzero(fits.boxes.pose == pose)

@@ -26,7 +26,7 @@ def place_labels(
 ) -> int:
     """Write a text beside each outline (2, n), so that none covers another; return how many.
 
-    The nearest of a few free places is taken, a far one with a line of the outline's colour. What
+    The nearest of a few free places is taken, a far one with a line of the outline's color. What
     finds no room has no name. Limits and size of the axes must be final.
     """
     from matplotlib.patheffects import withStroke

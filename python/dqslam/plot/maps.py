@@ -103,7 +103,7 @@ def _draw_path(axes: "Axes", poses: Floats, **style: Any) -> None:
 
 
 def _true_outlines(truth: Truth) -> list[Floats]:
-    """Return the outlines of the true objects from above, each (2, n), metres."""
+    """Return the outlines of the true objects from above, each (2, n), meters."""
     if truth.ellipsoids is None:
         radii = np.cbrt(0.75 / np.pi * truth.volume)
         shapes = radii[:, None, None] ** 2 * np.eye(3)

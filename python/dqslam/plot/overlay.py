@@ -9,7 +9,7 @@ import numpy as np
 
 from dqslam._checks import Floats
 from dqslam._files import FileError, whole_file
-from dqslam.evaluate_results import BoxFits
+from dqslam.evaluation import BoxFits
 from dqslam.io import Results
 from dqslam.plot.frame import draw_boxes, visible_outlines
 from dqslam.plot.style import class_styles, column_style, new_figure, save_figure

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dqslam._checks import Floats
-from dqslam.evaluate_results import BoxFits
+from dqslam.evaluation import BoxFits
 from dqslam.plot.style import (
     COLUMN_INCHES,
     GREY,

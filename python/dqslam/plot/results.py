@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dqslam.evaluate import Align
-from dqslam.evaluate_results import common_poses, fit_boxes, object_alignment, pose_errors
+from dqslam.evaluation import common_poses, fit_boxes, object_alignment, pose_errors
 from dqslam.io import Results, Trajectory, TrueObjects
+from dqslam.metrics import Align
 from dqslam.plot.boxes import draw_worst_and_median
 from dqslam.plot.errors import draw_errors
 from dqslam.plot.residuals import draw_residuals

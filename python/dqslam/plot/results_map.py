@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dqslam._checks import Floats
-from dqslam.evaluate import Alignment
 from dqslam.io import MapObjects, Results, TrueObjects
+from dqslam.metrics import Alignment
 from dqslam.plot.above import FromAbove, from_above, outline
 from dqslam.plot.gaps import break_at_gaps
 from dqslam.plot.labels import place_labels
@@ -56,7 +56,7 @@ def draw_results_map(results: Results, truth: MapTruth | None = None) -> "Figure
     """Draw odometry, estimate, objects by class, uncertainty of 2 sigma, and the truth if known.
 
     With the truth all is in its world: odometry and estimate are moved alike. Objects are outlines
-    from above, dotted the covariance of their centres; one that is no ellipsoid is a cross.
+    from above, dotted the covariance of their centers; one that is no ellipsoid is a cross.
     """
     move = Alignment(np.eye(3), np.zeros(3)) if truth is None else truth.alignment
     estimate, odometry = (

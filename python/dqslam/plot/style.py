@@ -1,4 +1,4 @@
-"""How all figures look: colours that the colour-blind can tell apart, sizes, files."""
+"""How all figures look: colors that the color-blind can tell apart, sizes, files."""
 
 import contextlib
 from collections import Counter
@@ -69,7 +69,7 @@ def new_figure(width: float, height: float) -> "Figure":
 
 
 def class_styles(class_names: Iterable[str]) -> dict[str, dict[str, Any]]:
-    """Return colour and line style of each class; names are one per object, frequent ones first."""
+    """Return color and line style of each class; names are one per object, frequent ones first."""
     styles: dict[str, dict[str, Any]] = {}
     for place, (name, _) in enumerate(Counter(class_names).most_common()):
         turn, color = divmod(place, len(_CLASS_COLORS))

@@ -34,7 +34,7 @@ _LOG_FROM = 20.0  # times the least: so wide a range is drawn in decades
 _MOST_SERIES = 6
 _APART = 0.012  # of the axis, between the points of two series
 # What is drawn, as far as it was measured; else the first two metrics.
-_SHOWN = {"rmse_pos": "positions", "rmse_landmark": "centres"}
+_SHOWN = {"rmse_pos": "positions", "rmse_landmark": "centers"}
 
 
 @dataclass(frozen=True)

@@ -187,7 +187,7 @@ class _Page:
 
 
 def place_eye(scene: Scene) -> tuple[Floats, Floats, float]:
-    """Return where to look from and at, (3,) each, to see all, and how far that reaches, metres."""
+    """Return where to look from and at, (3,) each, to see all, and how far that reaches, meters."""
     points = scene.estimate[:, :3]
     low, high = points.min(axis=0), points.max(axis=0)
     if scene.objects:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from dqslam._checks import Floats
-from dqslam.evaluate_results import box_overlaps
+from dqslam.evaluation import box_overlaps
 from dqslam.io import Results, TrueObjects
 
 Numbers = tuple[tuple[str, str], ...]
@@ -26,8 +26,8 @@ def overview(results: Results, evaluation: Mapping[str, Any]) -> Numbers:
     if not evaluation:
         return tuple(shown)
     shown += [
-        ("position error, rmse", _metres(evaluation["ate"]["rmse"])),
-        ("odometry's", _metres(evaluation["odometry_ate"]["rmse"])),
+        ("position error, rmse", _meters(evaluation["ate"]["rmse"])),
+        ("odometry's", _meters(evaluation["odometry_ate"]["rmse"])),
     ]
     objects = evaluation["objects"]
     if objects is not None:
@@ -44,10 +44,10 @@ def object_numbers(results: Results, evaluation: Mapping[str, Any]) -> list[Numb
     pairs = {pair["id"]: pair for pair in judged["pairs"]} if judged else {}
     described = []
     for row in range(len(objects)):
-        shown = [("centre", f"{_vector(objects.center[row])} m")]
+        shown = [("center", f"{_vector(objects.center[row])} m")]
         covariance = objects.center_covariance[row]
         if np.isfinite(covariance).all():
-            shown.append(("σ of centre", _lengths(np.sqrt(np.diag(covariance)))))
+            shown.append(("σ of center", _lengths(np.sqrt(np.diag(covariance)))))
         if objects.is_ellipsoid[row]:
             shown.append(("size", _lengths(2.0 * objects.semi_axes[row])))
         if np.isfinite(objects.log_semi_axes_sigma[row]).all():
@@ -65,7 +65,7 @@ def object_numbers(results: Results, evaluation: Mapping[str, Any]) -> list[Numb
 
 def true_object_numbers(true: TrueObjects, row: int) -> Numbers:
     """Describe one object of the truth, in the truth's own world."""
-    shown = [("true centre", f"{_vector(true.center[row])} m")]
+    shown = [("true center", f"{_vector(true.center[row])} m")]
     if true.size is not None:
         shown.append(("true size", _lengths(true.size[row])))
     if not true.static[row]:
@@ -76,7 +76,7 @@ def true_object_numbers(true: TrueObjects, row: int) -> Numbers:
 def _errors(pair: Mapping[str, Any] | None, judged: bool) -> Numbers:
     if pair is None:
         return (("truth", "no object like it"),) if judged else ()
-    shown = [("centre is off by", _metres(pair["center"]))]
+    shown = [("center is off by", _meters(pair["center"]))]
     if pair["true_id"] is not None:
         shown.insert(0, ("true id", str(pair["true_id"])))
     for title, key, form in (
@@ -95,11 +95,11 @@ def _vector(values: Floats) -> str:
 
 
 def _lengths(values: Floats) -> str:
-    """Write lengths side by side, in millimetres where none reaches 0.1 m."""
+    """Write lengths side by side, in millimeters where none reaches 0.1 m."""
     if values.max() < 0.1:
         return " × ".join(f"{1e3 * value:.2g}" for value in values) + " mm"
     return " × ".join(f"{value:.3f}" for value in values) + " m"
 
 
-def _metres(value: float) -> str:
+def _meters(value: float) -> str:
     return f"{value:.3g} m"

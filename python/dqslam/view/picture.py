@@ -7,7 +7,7 @@ from html import escape
 import numpy as np
 
 from dqslam._checks import Floats, Ints
-from dqslam.evaluate import project_outlines
+from dqslam.metrics import project_outlines
 from dqslam.view.scene import Scene
 
 _DASHES = {"fits": "", "misfit": "6 4", "held out": "1.5 3", "left out": ""}

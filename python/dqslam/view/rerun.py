@@ -156,5 +156,5 @@ def _box_color(scene: Scene, row: int) -> tuple[int, int, int]:
 
 
 def _from_corner(pixels: Floats) -> Floats:
-    """Return pixels counted from the corner of the image, as Rerun does, not from a centre."""
+    """Return pixels counted from the corner of the image, as Rerun does, not from a center."""
     return pixels + 0.5

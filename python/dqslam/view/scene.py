@@ -1,6 +1,6 @@
 """What there is to see, as plain data: every viewer shows this, none computes it.
 
-The world is that of the estimate, metres; the truth is moved into it. Poses are world_from_camera,
+The world is that of the estimate, meters; the truth is moved into it. Poses are world_from_camera,
 [tx ty tz qx qy qz qw], boxes [u_min, v_min, u_max, v_max] in undistorted pixels.
 """
 
@@ -15,9 +15,9 @@ import numpy as np
 from dqslam import _core
 from dqslam._checks import Floats, Ints
 from dqslam._colors import ORANGE, PURPLE, SKY, TRUTH
-from dqslam.evaluate import Align, Alignment, up_direction
-from dqslam.evaluate_results import common_poses, evaluate_results
+from dqslam.evaluation import common_poses, evaluate_results
 from dqslam.io import BoxTable, MapObjects, Results, Trajectory, TrueObjects
+from dqslam.metrics import Align, Alignment, up_direction
 from dqslam.view.numbers import Numbers, object_numbers, overview, true_object_numbers
 
 # Those that no path has, then more of the same kind (Tol's).
@@ -27,7 +27,7 @@ GAP = 5.0
 # Shown where covariances are.
 SIGMAS = 3.0
 CAMERAS = 60
-# Square metres: no axis of an ellipsoid is zero.
+# Square meters: no axis of an ellipsoid is zero.
 _NOTHING = 1e-18
 
 
@@ -36,9 +36,9 @@ class Spread:
     """The ellipsoid of ``SIGMAS`` standard deviations of a place."""
 
     center: Floats
-    """Metres, shape (3,)."""
+    """Meters, shape (3,)."""
     semi_axes: Floats
-    """Metres, shape (3,)."""
+    """Meters, shape (3,)."""
     orientation_xyzw: Floats
     """world_from_ellipsoid, shape (4,)."""
 
@@ -53,26 +53,26 @@ class SceneObject:
     color: str
     """``#rrggbb``, one a class; one an object where there is one class only."""
     center: Floats
-    """Metres, shape (3,)."""
+    """Meters, shape (3,)."""
     semi_axes: Floats | None
-    """Metres, shape (3,); None where it is no ellipsoid, or its size is unknown."""
+    """Meters, shape (3,); None where it is no ellipsoid, or its size is unknown."""
     orientation_xyzw: Floats | None
     """world_from_object, shape (4,); None with ``semi_axes``."""
     center_covariance: Floats | None
-    """Square metres, shape (3, 3); None where unknown."""
+    """Square meters, shape (3, 3); None where unknown."""
     numbers: Numbers
     """What is known of it, in words."""
 
     @property
     def ellipsoid(self) -> Floats | None:
-        """Centre and log-Cholesky shape, shape (9,)."""
+        """Center and log-Cholesky shape, shape (9,)."""
         if self.semi_axes is None or self.orientation_xyzw is None:
             return None
         return _core.ellipsoid_from_axes(self.center, self.semi_axes, self.orientation_xyzw)
 
     @property
     def spread(self) -> Spread | None:
-        """How uncertain the centre is."""
+        """How uncertain the center is."""
         if self.center_covariance is None:
             return None
         return spread_of(self.center, self.center_covariance)
@@ -227,7 +227,7 @@ def _inverse(true_from_estimated: Mapping[str, Any]) -> Alignment:
 
 
 def _class_colors(mapped: MapObjects, true: TrueObjects | None) -> dict[str, str]:
-    """Return the colour of each class, those of the map first; more classes than colours share."""
+    """Return the color of each class, those of the map first; more classes than colors share."""
     names = sorted(set(mapped.class_name))
     names += sorted(set(true.class_name or () if true else ()) - set(names))
     return {name: CLASSES[k % len(CLASSES)] for k, name in enumerate(names)}

@@ -1,6 +1,6 @@
 """Cameras from COLMAP's ``cameras.txt``: ``CAMERA_ID MODEL WIDTH HEIGHT PARAMS...``.
 
-COLMAP counts pixels from the corner of the image, so that the first pixel's centre is at 0.5: half
+COLMAP counts pixels from the corner of the image, so that the first pixel's center is at 0.5: half
 a pixel is taken from its principal point. One camera a file.
 """
 

@@ -1,7 +1,7 @@
-"""Cameras from KITTI's calibration: the 3 x 4 projection of the left colour camera, rectified.
+"""Cameras from KITTI's calibration: the 3 x 4 projection of the left color camera, rectified.
 
 ``P2:`` in the files of the odometry, tracking and object benchmarks, ``P_rect_02:`` in the raw
-``calib_cam_to_cam.txt``. No distortion, integer pixel coordinates at pixel centres. Only the raw
+``calib_cam_to_cam.txt``. No distortion, integer pixel coordinates at pixel centers. Only the raw
 file has the image size, ``S_rect_02:``; to the others add such a line, for instance
 ``S_rect_02: 1242 375``.
 """

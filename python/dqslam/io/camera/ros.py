@@ -1,7 +1,7 @@
 """Cameras from ROS: the YAML of camera_calibration (camera_info), and a CameraInfo as printed.
 
 ``camera_matrix`` (or K, k) and ``distortion_coefficients`` (or D, d) of the raw image, model
-``plumb_bob``: k1 k2 p1 p2 k3, integer pixel coordinates at pixel centres. Boxes in a rectified
+``plumb_bob``: k1 k2 p1 p2 k3, integer pixel coordinates at pixel centers. Boxes in a rectified
 image need the camera of ``projection_matrix`` instead, without distortion, which is not what is
 read here. Needs PyYAML: pip install 'dqslam[yaml]'.
 """

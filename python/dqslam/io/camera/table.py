@@ -3,7 +3,7 @@
 Keys: ``fx fy cx cy`` px, ``width height`` px, and the lens distortion of OpenCV's five numbers
 (absent: none) as ``k1 k2 p1 p2 k3``, or as a list in that order under ``distortion`` or
 ``dist_k1k2p1p2k3``, or as a table ``distortion``. Other keys are ignored.
-Integer pixel coordinates are pixel centres: the image spans [-0.5, width - 0.5] in x.
+Integer pixel coordinates are pixel centers: the image spans [-0.5, width - 0.5] in x.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Detections as CSV: ``frame,timestamp,x1,y1,x2,y2,score,class_id,class_name,track_id``.
 
-Corners in pixels, whole numbers at pixel centres, counted from 0.
+Corners in pixels, whole numbers at pixel centers, counted from 0.
 The columns are found by name, in any order; others are ignored, and ``track_id`` may be absent.
 An empty score is 1 (trackers give none), an empty ``track_id`` or -1 is a box that no object has
 claimed. Rows may be in any order, but later frames have later times. # starts a comment line.

@@ -1,6 +1,6 @@
 """Detections from ROS bags: vision_msgs/Detection2DArray.
 
-A box is its centre and size in pixels; whole numbers are taken for pixel centres counted from 0, as
+A box is its center and size in pixels; whole numbers are taken for pixel centers counted from 0, as
 in CameraInfo; vision_msgs does not say. A turned box is refused. The best hypothesis gives class
 and score: a class that is a number is its id, others are numbered in the order of their names.
 ``id`` (vision_msgs 4) or ``tracking_id`` is the track; ones that are no numbers are counted as they

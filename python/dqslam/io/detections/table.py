@@ -1,7 +1,7 @@
 """Detections in memory, and the checks that all formats share.
 
 Boxes are corners in pixels of the image as recorded (distorted, where the lens does); whole numbers
-are pixel centres, the first pixel's is 0: the image spans [-0.5, width - 0.5].
+are pixel centers, the first pixel's is 0: the image spans [-0.5, width - 0.5].
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ def _check_shape(table: DetectionTable) -> None:
 
 
 def _inside(table: DetectionTable, width: int, height: int) -> NDArray[np.float64]:
-    """Cut boxes to the image, which spans half a pixel more than the centres of its pixels."""
+    """Cut boxes to the image, which spans half a pixel more than the centers of its pixels."""
     box = table.box
     last = np.array([width, height]) - 0.5
     outside = np.flatnonzero(np.any((box[:, 2:] <= -0.5) | (box[:, :2] >= last), axis=1))

@@ -1,6 +1,6 @@
 """Detections as YOLO text: a file an image, a line ``class cx cy w h [score [id]]`` a box.
 
-Centre and size are shares of the image's width and height, which must be known, and count from the
+Center and size are shares of the image's width and height, which must be known, and count from the
 corner of the image: half a pixel is taken. The frame is what the file is named, see
 `dqslam.io.frames.frame_of`. Names of classes are those of ``classes``, of ``classes.txt`` (a line a
 class, from 0), of ``names`` in ``data.yaml``, or the number. Times are those of the frames, or of
@@ -102,9 +102,9 @@ def write_yolo(
         wrong = min(names) if min(names) < 0 else max(names)
         raise FileError(path, f"yolo has no place for class {wrong}, only for 0 to {LARGEST_CLASS}")
     corner = (table.box + CORNER) / np.tile([width, height], 2)
-    centre, size = (corner[:, :2] + corner[:, 2:]) / 2, corner[:, 2:] - corner[:, :2]
+    center, size = (corner[:, :2] + corner[:, 2:]) / 2, corner[:, 2:] - corner[:, :2]
     content: dict[str, list[str]] = {}
-    for row, numbers in enumerate(np.hstack([centre, size]).tolist()):
+    for row, numbers in enumerate(np.hstack([center, size]).tolist()):
         line = f"{table.class_id[row]} " + " ".join(f"{number:.12f}" for number in numbers)
         line += f" {float(table.score[row])!r}"
         if table.track_id is not None:

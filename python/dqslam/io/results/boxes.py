@@ -3,7 +3,7 @@
 ``timestamp``
     Seconds, that of a pose of ``trajectory.txt``.
 ``x1 y1 x2 y2``
-    Corners in undistorted pixels, whole numbers at pixel centres.
+    Corners in undistorted pixels, whole numbers at pixel centers.
 ``truncated``
     The edges among ``x1 y1 x2 y2`` that are the border of the image, which the object leaves.
 ``score class_id class_name``

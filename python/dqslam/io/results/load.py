@@ -28,15 +28,15 @@ class MapObjects:
     class_name: tuple[str, ...]
     """One per object."""
     center: Floats
-    """In the world, metres, shape (o, 3)."""
+    """In the world, meters, shape (o, 3)."""
     semi_axes: Floats
-    """Descending, metres, shape (o, 3); NaN where the object is no ellipsoid."""
+    """Descending, meters, shape (o, 3); NaN where the object is no ellipsoid."""
     orientation_xyzw: Floats
     """world_from_object, shape (o, 4); NaN where it is no ellipsoid."""
     observations: Ints
     """Boxes that were used, shape (o,)."""
     center_covariance: Floats
-    """Square metres, shape (o, 3, 3); NaN where unknown."""
+    """Square meters, shape (o, 3, 3); NaN where unknown."""
     log_semi_axes_sigma: Floats
     """Of the natural logarithms of the semi-axes, shape (o, 3); NaN where unknown."""
     dropped: Mapping[int, str] = field(default_factory=dict)
@@ -53,7 +53,7 @@ class MapObjects:
 
     @property
     def ellipsoids(self) -> Floats:
-        """Centre and log-Cholesky shape, shape (o, 9); NaN where it is no ellipsoid."""
+        """Center and log-Cholesky shape, shape (o, 9); NaN where it is no ellipsoid."""
         rows = np.full((len(self), 9), np.nan)
         for row in np.flatnonzero(self.is_ellipsoid):
             axes, turn = self.semi_axes[row], self.orientation_xyzw[row]

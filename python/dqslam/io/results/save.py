@@ -26,7 +26,7 @@ class Covariances(Protocol):
 
     @property
     def objects(self) -> Floats:
-        """Covariance of centre [m] and log-Cholesky shape, shape (o, 9, 9); NaN for none."""
+        """Covariance of center [m] and log-Cholesky shape, shape (o, 9, 9); NaN for none."""
 
 
 def save_estimate(
@@ -80,7 +80,7 @@ def _camera(camera: _core.Camera) -> dict[str, Any]:
 
 
 def _object(estimate: Estimate, row: int, marginals: Covariances | None) -> dict[str, Any]:
-    """Describe one object; a dual quadric that is no ellipsoid has a centre, but null axes."""
+    """Describe one object; a dual quadric that is no ellipsoid has a center, but null axes."""
     semi_axes, orientation = None, None
     if estimate.is_ellipsoid[row]:
         _, semi_axes, orientation = _core.axes_from_ellipsoid(estimate.ellipsoids[row])

@@ -1,6 +1,6 @@
 """KITTI trajectories: 12 numbers a line, the rows of the 3 x 4 matrix [R t] world_from_camera.
 
-Metres; the camera's x points right, y down, z forward. The first line is frame 0, each next line
+Meters; the camera's x points right, y down, z forward. The first line is frame 0, each next line
 one more: there are no times, see `dqslam.io.frames`. In KITTI's odometry benchmark the camera is
 number 0, the left grey one; boxes in the images of camera 2 are 6 cm beside it.
 """

@@ -43,7 +43,7 @@ def make_trajectory(
     *,
     repeated_times: bool,
 ) -> Trajectory:
-    """Check times (n,) and poses (n, 7) from these lines of a file, and normalise quaternions."""
+    """Check times (n,) and poses (n, 7) from these lines of a file, and normalize quaternions."""
     line_numbers = np.array(lines)
     if repeated_times:
         keep = np.concatenate([[True], times[1:] != times[:-1]])
@@ -53,7 +53,7 @@ def make_trajectory(
     if far.size:
         message = f"position is further than {LARGEST_COORDINATE:g} m from the origin"
         raise FileError(path, message, int(line_numbers[far[0]]))
-    return Trajectory(times, _normalised(path, poses, line_numbers))
+    return Trajectory(times, _normalized(path, poses, line_numbers))
 
 
 def _check_times(path: str | Path, times: NDArray[np.float64], lines: NDArray[np.int64]) -> None:
@@ -65,7 +65,7 @@ def _check_times(path: str | Path, times: NDArray[np.float64], lines: NDArray[np
         raise FileError(path, message, int(lines[i + 1]))
 
 
-def _normalised(
+def _normalized(
     path: str | Path, poses: NDArray[np.float64], lines: NDArray[np.int64]
 ) -> NDArray[np.float64]:
     norm = np.linalg.norm(poses[:, 3:], axis=1)

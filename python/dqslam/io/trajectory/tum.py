@@ -1,6 +1,6 @@
 """TUM trajectories: one line ``t tx ty tz qx qy qz qw`` a pose.
 
-The pose is world_from_camera: metres, unit quaternion x y z w, camera x right, y down, z forward.
+The pose is world_from_camera: meters, unit quaternion x y z w, camera x right, y down, z forward.
 Time is in seconds and strictly increasing. Lines that start with # are comments.
 """
 

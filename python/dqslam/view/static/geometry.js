@@ -1,5 +1,5 @@
 // Vectors, poses and outlines. Conventions are those of the files: poses world_from_camera
-// [tx ty tz qx qy qz qw], the camera's x right, y down, z forward; metres and undistorted pixels.
+// [tx ty tz qx qy qz qw], the camera's x right, y down, z forward; meters and undistorted pixels.
 "use strict";
 
 const geometry = (() => {
@@ -46,8 +46,8 @@ const geometry = (() => {
   /**
    * The ellipse that an ellipsoid is seen as, null unless all of it is in front of the camera.
    *
-   * The dual conic of centre p and shape M in the camera is C* = p p^T - M, for a camera of focal
-   * length 1. Divided by its last entry it is [m m^T - E, m; m^T, 1]: centre m, shape E.
+   * The dual conic of center p and shape M in the camera is C* = p p^T - M, for a camera of focal
+   * length 1. Divided by its last entry it is [m m^T - E, m; m^T, 1]: center m, shape E.
    */
   function outlineOf(view, lens, center, shape) {
     const p = inCamera(view, center);

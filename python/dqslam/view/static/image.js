@@ -18,7 +18,7 @@ class ImageView {
     this.canvas.width = Math.round(this.canvas.clientWidth * ratio);
     this.canvas.height = Math.round(this.canvas.clientHeight * ratio);
     const context = this.canvas.getContext("2d");
-    // Whole numbers are centres of pixels, hence the border is half a pixel before them.
+    // Whole numbers are centers of pixels, hence the border is half a pixel before them.
     context.setTransform(ratio * this.scale, 0, 0, ratio * this.scale,
       ratio * this.scale / 2, ratio * this.scale / 2);
     const rows = this.boxesOf[frame];

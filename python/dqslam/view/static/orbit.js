@@ -66,9 +66,9 @@ class Orbit {
 
   move(right, down) {
     const { view, lens } = this.look();
-    const metres = this.distance / lens.fx;
-    const shift = geometry.add(geometry.scale(-right * metres, view.axes[0]),
-      geometry.scale(-down * metres, view.axes[1]));
+    const meters = this.distance / lens.fx;
+    const shift = geometry.add(geometry.scale(-right * meters, view.axes[0]),
+      geometry.scale(-down * meters, view.axes[1]));
     this.target = geometry.add(this.target, shift);
     this.onChange();
   }

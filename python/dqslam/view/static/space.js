@@ -25,7 +25,7 @@ class SpaceView {
     });
   }
 
-  /** Centres of the objects, without those so far off that the rest would be a dot. */
+  /** Centers of the objects, without those so far off that the rest would be a dot. */
   near(path) {
     const middle = [0, 1, 2].map((k) => path.reduce((sum, point) => sum + point[k], 0) / path.length);
     const away = (point) => geometry.length(geometry.subtract(point, middle));
@@ -35,7 +35,7 @@ class SpaceView {
     return centers.filter((center) => away(center) < most);
   }
 
-  /** The height that the tenth part of the objects reaches down to, or the path, metres. */
+  /** The height that the tenth part of the objects reaches down to, or the path, meters. */
   findGround(path) {
     const { up, objects } = this.scene;
     const bottoms = objects.flatMap((object, row) => {
@@ -142,7 +142,7 @@ class SpaceView {
     this.addCamera(items, estimate[frame], 2.5 * size, { strokeStyle: "#111", lineWidth: 1.8 }, frame);
   }
 
-  /** A pyramid from the camera to its image, which is `size` metres away; boxes on the current one. */
+  /** A pyramid from the camera to its image, which is `size` meters away; boxes on the current one. */
   addCamera(items, pose, size, style, frame = -1) {
     const { camera, boxes, objects } = this.scene;
     const view = geometry.viewOf(pose);

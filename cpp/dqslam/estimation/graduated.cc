@@ -1,0 +1,86 @@
+#include "dqslam/estimation/graduated.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "dqslam/estimation/repair.h"
+
+namespace dqslam {
+namespace {
+
+constexpr double kGraduation = 1.6;     // of the control parameter, each round
+constexpr double kLargestAtStart = 10;  // chi-square, in thresholds
+constexpr int kMaxRounds = 60;
+constexpr int kRoundIterations = 15;
+
+// Weight of a box with chi-square s at threshold c2, for control parameter mu (Yang 2020, eqs. 12
+// and 14; for Geman-McClure mu falls to 1, for truncated least squares it rises).
+double Weight(Loss loss, double s, double c2, double mu) {
+  if (std::isinf(s)) return 0;
+  if (loss == Loss::kGncGm) return std::pow(mu * c2 / (s + mu * c2), 2);
+  if (s <= mu / (mu + 1) * c2) return 1;
+  if (s >= (mu + 1) / mu * c2) return 0;
+  return std::sqrt(c2 * mu * (mu + 1) / s) - mu;
+}
+
+}  // namespace
+
+bool IsRobust(Loss loss) {
+  return loss != Loss::kNone;
+}
+
+bool ThrowsBoxesOut(Loss loss) {
+  return IsRobust(loss) && loss != Loss::kHuber && loss != Loss::kCauchy;
+}
+
+Summary GraduateNonConvexity(const PreparedGraph& prepared,
+                             const SolveOptions& options,
+                             const Monitor& monitor,
+                             State* state) {
+  const bool truncated = options.loss == Loss::kGncTls;
+  const double c2 = options.outlier_chi_square;
+  Stage stage = BatchStage(prepared, options);
+  stage.loss = Loss::kNone;
+  stage.minimizer = Minimizer::kLevenbergMarquardt;
+  stage.max_iterations = kRoundIterations;
+  stage.function_tolerance = options.grow_tolerance;
+  stage.weights.assign(stage.boxes.size(), 1.0);
+
+  // Yang et al. start where the surrogate is convex over all residuals; a state that was grown with
+  // a robust loss is better than the all-inlier fit which that leads to, so it keeps its far
+  // outliers out from the first round on.
+  const double largest = kLargestAtStart * c2;
+  double mu = truncated ? c2 / (2 * largest - c2) : 2 * largest / c2;
+  Summary total;
+  for (int round = 0; round < kMaxRounds; ++round) {
+    const Eigen::VectorXd costs = BoxCosts(prepared, options, *state);
+    bool decided = true;
+    for (size_t i = 0; i < stage.boxes.size(); ++i) {
+      const double weight = Weight(options.loss, 2 * costs[stage.boxes[i]], c2, mu);
+      decided = decided && (weight == 0 || weight == 1);
+      stage.weights[i] = weight;
+    }
+    Append(Optimize(prepared, options, stage, monitor, state), &total);
+    if (truncated ? decided && round > 0 : mu <= 1) break;
+    mu = truncated ? mu * kGraduation : std::max(mu / kGraduation, 1.0);
+  }
+  // The final problem: inliers only, to the end.
+  const std::vector<bool> inliers = InlierBoxes(prepared, options, *state);
+  for (size_t i = 0; i < stage.boxes.size(); ++i) stage.weights[i] = inliers[stage.boxes[i]];
+  stage.minimizer = options.minimizer;
+  stage.max_iterations = options.max_iterations;
+  stage.function_tolerance = options.function_tolerance;
+  Append(Optimize(prepared, options, stage, monitor, state), &total);
+  return total;
+}
+
+std::vector<bool> InlierBoxes(const PreparedGraph& prepared,
+                              const SolveOptions& options,
+                              const State& state) {
+  const Eigen::VectorXd costs = BoxCosts(prepared, options, state);
+  std::vector<bool> inliers;
+  for (const double cost : costs) inliers.push_back(2 * cost <= options.outlier_chi_square);
+  return inliers;
+}
+
+}  // namespace dqslam

@@ -1,0 +1,115 @@
+#include "dqslam/estimation/grow.h"
+
+#include <algorithm>
+
+#include "dqslam/estimation/graduated.h"
+
+namespace dqslam {
+namespace {
+
+// The end of the poses to add behind `begin`: options.grow_poses of them, and more while the
+// rotation that odometry may have lost since `begin` stays small.
+int EndOfAddition(const PreparedGraph& prepared, const SolveOptions& options, int begin) {
+  const OdometryTable& odometry = prepared.graph.odometry;
+  const int k = prepared.graph.tangent_size();
+  const int rotations = prepared.graph.pose_model == PoseModel::kSe2 ? 1 : 3;
+  double variance = 0;
+  int end = begin;
+  for (; end < prepared.graph.num_poses(); ++end) {
+    if (end > 0) {
+      const double* covariance = odometry.covariance.row(prepared.odometry_into[end]).data();
+      for (int axis = k - rotations; axis < k; ++axis) variance += covariance[axis * k + axis];
+    }
+    const bool drifted = variance > options.grow_rotation * options.grow_rotation;
+    if (drifted && end - begin >= options.grow_poses) break;
+  }
+  return end;
+}
+
+Vector9d InModel(const Vector9d& ellipsoid, LandmarkModel model) {
+  return model == LandmarkModel::kEllipsoid ? ellipsoid : DualQuadricFromEllipsoid(ellipsoid);
+}
+
+}  // namespace
+
+std::vector<View> ViewsOf(const PreparedGraph& prepared,
+                          const State& state,
+                          const std::vector<int>& boxes) {
+  std::vector<View> views;
+  for (const int row : boxes) {
+    views.push_back({LocateCamera(prepared, state, prepared.graph.boxes.pose[row]),
+                     prepared.graph.boxes.box.row(row),
+                     prepared.box_sqrt_information[row],
+                     prepared.graph.boxes.truncated.row(row)});
+  }
+  return views;
+}
+
+Vector9d StartObject(const PreparedGraph& prepared,
+                     const SolveOptions& options,
+                     const State& state,
+                     int object,
+                     const std::vector<int>& boxes) {
+  const Graph& graph = prepared.graph;
+  const std::vector<View> views = ViewsOf(prepared, state, boxes);
+  const SizePrior prior{graph.size_prior.log_mean[object], graph.size_prior.log_sigma[object]};
+  const bool unconstrained = options.landmark_model == LandmarkModel::kDualQuadric;
+  switch (options.start) {
+    case Start::kIdentity:
+      return unconstrained ? IdentityQuadric() : Sphere(Eigen::Vector3d::Zero(), 1);
+    case Start::kSizePrior:
+      return InModel(BackProject(graph.camera, views, prior), options.landmark_model);
+    case Start::kSvd:
+      if (views.size() >= 3) {
+        const SvdFit fit = FitSvd(graph.camera, views);
+        if (unconstrained) return fit.quadric;
+        try {
+          return EllipsoidFromDualQuadric(fit.quadric);
+        } catch (const std::invalid_argument&) {
+          // no ellipsoid: the sphere instead
+        }
+      }
+      break;
+    case Start::kSphere:
+      break;
+  }
+  return InModel(FitSphere(graph.camera, views, prior), options.landmark_model);
+}
+
+Summary Grow(const PreparedGraph& prepared,
+             const SolveOptions& options,
+             const Monitor& monitor,
+             State* state) {
+  const Graph& graph = prepared.graph;
+  std::vector<bool> started(graph.num_objects(), false);
+  Summary total;
+  for (int begin = 0, end = 0; begin < graph.num_poses(); begin = end) {
+    end = EndOfAddition(prepared, options, begin);
+    Stage stage;
+    stage.end_pose = end;
+    const bool last = end == graph.num_poses();
+    DeadReckon(prepared, begin, end, state);
+    for (int object = 0; object < graph.num_objects(); ++object) {
+      const std::vector<int>& rows = prepared.boxes_of_object[object];
+      const auto behind = std::partition_point(
+          rows.begin(), rows.end(), [&](int row) { return graph.boxes.pose[row] < end; });
+      const std::vector<int> seen(rows.begin(), behind);
+      if (!started[object] && (last || static_cast<int>(seen.size()) >= options.grow_min_views)) {
+        state->landmarks.row(object) = StartObject(prepared, options, *state, object, seen);
+        started[object] = true;
+      }
+      if (started[object]) stage.boxes.insert(stage.boxes.end(), seen.begin(), seen.end());
+    }
+    if (stage.boxes.empty()) continue;
+    stage.residual =
+        options.residual == Residual::kTangentThenBox ? Residual::kTangent : options.residual;
+    stage.loss = IsRobust(options.loss) ? Loss::kCauchy : Loss::kNone;
+    stage.minimizer = Minimizer::kLevenbergMarquardt;
+    stage.max_iterations = options.grow_iterations;
+    stage.function_tolerance = options.grow_tolerance;
+    Append(Optimize(prepared, options, stage, monitor, state), &total);
+  }
+  return total;
+}
+
+}  // namespace dqslam

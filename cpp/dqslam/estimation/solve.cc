@@ -1,0 +1,216 @@
+#include "dqslam/estimation/solve.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "dqslam/estimation/graduated.h"
+#include "dqslam/estimation/grow.h"
+#include "dqslam/estimation/repair.h"
+#include "dqslam/geometry/dispatch.h"
+
+namespace dqslam {
+namespace {
+
+void ValidateOptions(const SolveOptions& options) {
+  const auto require = [](bool good, const char* what) {
+    if (!good) throw std::invalid_argument(what);
+  };
+  require(options.algebraic_sigma > 0, "algebraic_sigma must be positive");
+  require(options.loss_scale > 0, "loss_scale must be positive");
+  require(options.outlier_chi_square > 0, "outlier_chi_square must be positive");
+  require(options.max_iterations > 0, "max_iterations must be positive");
+  require(options.function_tolerance > 0, "function_tolerance must be positive");
+  require(options.grow_poses > 0, "grow_poses must be positive");
+  require(options.grow_rotation >= 0, "grow_rotation must not be negative");
+  require(options.grow_iterations > 0, "grow_iterations must be positive");
+  require(options.grow_min_views > 0, "grow_min_views must be positive");
+}
+
+void ValidateStart(const Graph& graph, const State& start) {
+  const bool shapes_match =
+      start.poses.rows() == graph.num_poses() && start.poses.cols() == graph.pose_size() &&
+      start.landmarks.rows() == graph.num_objects() && start.landmarks.cols() == kLandmarkSize;
+  if (!shapes_match || !start.poses.allFinite() || !start.landmarks.allFinite()) {
+    throw std::invalid_argument("start: need finite poses (" + std::to_string(graph.num_poses()) +
+                                ", " + std::to_string(graph.pose_size()) + ") and landmarks (" +
+                                std::to_string(graph.num_objects()) + ", 9)");
+  }
+  if (graph.pose_model == PoseModel::kSe3 &&
+      ((start.poses.rightCols<4>().rowwise().norm().array() - 1).abs() > 1e-6).any()) {
+    throw std::invalid_argument("start: the quaternions of the poses must be unit");
+  }
+}
+
+class Solver {
+ public:
+  Solver(const PreparedGraph& prepared, const SolveOptions& options, const Monitor& monitor)
+      : graph_(prepared.graph), options_(options), monitor_(monitor), prepared_(prepared) {}
+
+  /// Whether objects remain where their boxes say that they cannot be.
+  bool LeavesObjectsStuck(const State& state) const {
+    const std::vector<bool> stuck = StuckObjects(prepared_, options_, state);
+    return std::any_of(stuck.begin(), stuck.end(), [](bool is_stuck) { return is_stuck; });
+  }
+
+  bool LeavesPathTorn(const State& state) const { return IsTorn(prepared_, state); }
+
+  /// Of every object's linear fit at the initial poses; NaN where it has fewer than 3 views.
+  RowMatrix SvdSingularValues() const {
+    State state{graph_.initial_poses, RowMatrix()};
+    RowMatrix values = RowMatrix::Constant(graph_.num_objects(), 10, std::nan(""));
+    for (int object = 0; object < graph_.num_objects(); ++object) {
+      const std::vector<View> views = ViewsOf(prepared_, state, prepared_.boxes_of_object[object]);
+      if (views.size() >= 3) values.row(object) = FitSvd(graph_.camera, views).singular_values;
+    }
+    return values;
+  }
+
+  Mask Inliers(const State& state) const {
+    const std::vector<bool> inliers = InlierBoxes(prepared_, options_, state);
+    Mask mask(inliers.size());
+    std::copy(inliers.begin(), inliers.end(), mask.begin());
+    return mask;
+  }
+
+  Summary Run(const std::optional<State>& start, State* state) {
+    state->switches = Eigen::VectorXd::Ones(graph_.boxes.size());
+    Summary summary;
+    if (start) {
+      state->poses = start->poses;
+      state->landmarks = start->landmarks;
+    } else {
+      const auto begin = std::chrono::steady_clock::now();
+      summary = ReachStart(state);
+      const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - begin;
+      summary.start_seconds = elapsed.count();
+    }
+    if (ThrowsBoxesOut(options_.loss)) {
+      Append(Batch(BatchStage(prepared_, options_).residual, Loss::kCauchy, state), &summary);
+    }
+    if (options_.loss == Loss::kGncTls || options_.loss == Loss::kGncGm) {
+      Append(GraduateNonConvexity(prepared_, options_, monitor_, state), &summary);
+      return summary;
+    }
+    if (options_.loss == Loss::kSwitchable) SetSwitches(state);
+    Append(Batch(BatchStage(prepared_, options_).residual, options_.loss, state), &summary);
+    if (Refines()) {
+      RestartStuckObjects(prepared_, options_, monitor_, state, &summary);
+      TryOtherDepths(prepared_, options_, monitor_, state, &summary);
+    }
+    return summary;
+  }
+
+ private:
+  bool Refines() const { return options_.residual == Residual::kTangentThenBox; }
+
+  Summary ReachStart(State* state) {
+    state->poses = graph_.initial_poses;
+    state->landmarks = RowMatrix::Zero(graph_.num_objects(), kLandmarkSize);
+    if (options_.schedule == Schedule::kGrow && options_.mode == Mode::kSlam) {
+      return Grow(prepared_, options_, monitor_, state);
+    }
+    StartAll(state);
+    const Loss loss = IsRobust(options_.loss) ? Loss::kCauchy : Loss::kNone;
+    return Refines() ? Batch(Residual::kTangent, loss, state) : Summary();
+  }
+
+  // The minimum of s^2 chi^2 + phi (1 - s)^2: with all boxes switched on, the first steps would
+  // leave what the Cauchy loss has reached.
+  void SetSwitches(State* state) const {
+    const double phi = options_.outlier_chi_square;
+    state->switches = phi / (phi + 2 * BoxCosts(prepared_, options_, *state).array());
+  }
+
+  void StartAll(State* state) {
+    for (int object = 0; object < graph_.num_objects(); ++object) {
+      state->landmarks.row(object) =
+          StartObject(prepared_, options_, *state, object, prepared_.boxes_of_object[object]);
+    }
+  }
+
+  Summary Batch(Residual residual, Loss loss, State* state) {
+    Stage stage = BatchStage(prepared_, options_);
+    stage.residual = residual;
+    stage.loss = loss;
+    const bool all_defined =
+        residual != Residual::kBox || BoxCosts(prepared_, options_, *state).allFinite();
+    Summary summary = Optimize(prepared_, options_, stage, monitor_, state);
+    // Boxes that were undefined at the start have used the tangent residual until here.
+    if (!all_defined) Append(Optimize(prepared_, options_, stage, monitor_, state), &summary);
+    return summary;
+  }
+
+  const Graph& graph_;
+  const SolveOptions& options_;
+  const Monitor& monitor_;
+  const PreparedGraph& prepared_;
+};
+
+// Grows again in smaller steps, up to two times, where objects are stuck, the path is torn or the
+// last stage did not converge, and keeps the lowest cost.  With a robust loss an object may well
+// have outliers only: there it grows once, in smaller steps from the first.
+Summary SolveInAttempts(const PreparedGraph& prepared,
+                        const SolveOptions& options,
+                        const std::optional<State>& start,
+                        const Monitor& monitor,
+                        State* state) {
+  const bool repeats = !start && options.mode == Mode::kSlam && options.loss == Loss::kNone &&
+                       options.schedule == Schedule::kGrow &&
+                       options.residual == Residual::kTangentThenBox;
+  SolveOptions variant = options;
+  Summary best;
+  for (int attempt = 0; attempt < (repeats ? 3 : 1); ++attempt) {
+    const int halvings = 2 * (IsRobust(options.loss) ? 1 : attempt);
+    variant.grow_poses = std::max(options.grow_poses >> halvings, 1);
+    variant.grow_rotation = options.grow_rotation / (1 << halvings);
+    Solver solver(prepared, variant, monitor);
+    State reached;
+    const Summary summary = solver.Run(start, &reached);
+    if (attempt == 0 || summary.final_cost < best.final_cost) {
+      best = summary;
+      *state = reached;
+    }
+    if (best.converged && !solver.LeavesObjectsStuck(*state) && !solver.LeavesPathTorn(*state)) {
+      break;
+    }
+  }
+  return best;
+}
+
+}  // namespace
+
+Solution Solve(const Graph& graph,
+               const SolveOptions& options,
+               const std::optional<State>& start,
+               const Monitor& monitor) {
+  const auto begin = std::chrono::steady_clock::now();
+  ValidateOptions(options);
+  if (start) ValidateStart(graph, *start);
+  const PreparedGraph prepared(graph, options.mode == Mode::kMapping);
+  State state;
+  Solution solution;
+  solution.summary = SolveInAttempts(prepared, options, start, monitor, &state);
+  const Solver solver(prepared, options, monitor);
+  solution.svd_singular_values = options.start == Start::kSvd
+                                     ? solver.SvdSingularValues()
+                                     : RowMatrix::Constant(graph.num_objects(), 10, std::nan(""));
+  Dispatch(graph.pose_model, [&state](auto pose) {
+    for (int row = 0; row < state.poses.rows(); ++row) pose.Normalize(state.poses.row(row).data());
+  });
+  solution.poses = state.poses;
+  solution.inliers = solver.Inliers(state);
+  solution.landmarks = state.landmarks;
+  solution.dual_quadrics = state.landmarks;
+  if (options.landmark_model == LandmarkModel::kEllipsoid) {
+    for (Eigen::Index row = 0; row < state.landmarks.rows(); ++row) {
+      solution.dual_quadrics.row(row) =
+          DualQuadricFromEllipsoid(state.landmarks.row(row).transpose());
+    }
+  }
+  const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - begin;
+  solution.summary.seconds = elapsed.count();
+  return solution;
+}
+
+}  // namespace dqslam

@@ -1,0 +1,28 @@
+// From a graph to an estimate: plain data in, plain data out.
+#pragma once
+
+#include <optional>
+
+#include "dqslam/problem/graph.h"
+#include "dqslam/problem/options.h"
+#include "dqslam/solver/stage.h"
+
+namespace dqslam {
+
+struct Solution {
+  RowMatrix poses;                ///< (poses, d)
+  RowMatrix landmarks;            ///< (objects, 9) parameters of the landmark model
+  RowMatrix dual_quadrics;        ///< (objects, 9) q1 .. q9, whichever the model
+  RowMatrix svd_singular_values;  ///< (objects, 10) of the SVD starts; NaN where not used
+  Mask inliers;                   ///< (boxes) chi-square at most options.outlier_chi_square
+  Summary summary;
+};
+
+/// Solves from the odometry, or from `start` where it is given (parameters of the landmark model).
+/// Throws std::invalid_argument for bad input and Interrupted when the monitor asks to stop.
+Solution Solve(const Graph& graph,
+               const SolveOptions& options,
+               const std::optional<State>& start,
+               const Monitor& monitor = nullptr);
+
+}  // namespace dqslam

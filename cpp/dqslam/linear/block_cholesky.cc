@@ -1,0 +1,141 @@
+#include "dqslam/linear/block_cholesky.h"
+
+#include <algorithm>
+#include <stdexcept>
+#include <string>
+
+#include "dqslam/linear/dense_front.h"
+
+namespace dqslam {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+// A front without its update: L of its pivots and of the rows below them.
+auto PivotsOf(const double* factor, const Front& front) {
+  return Eigen::Map<const MatrixXd, 0, Eigen::OuterStride<>>(
+      factor, front.pivots, front.pivots, Eigen::OuterStride<>(front.rows()));
+}
+auto BelowOf(const double* factor, const Front& front) {
+  return Eigen::Map<const MatrixXd, 0, Eigen::OuterStride<>>(
+      factor + front.pivots, front.below, front.pivots, Eigen::OuterStride<>(front.rows()));
+}
+
+}  // namespace
+
+BlockCholesky::BlockCholesky(const BlockMatrix& A)
+    : elimination_(A), factor_(elimination_.fronts.back().factor + kFrontPadding) {
+  for (int s = 0; s < 2; ++s) stacks_[s].resize(elimination_.stack_size[s]);
+}
+
+bool BlockCholesky::Factorize(const BlockMatrix& A, const VectorXd& damping) {
+  const size_t rows = elimination_.place.size(), blocks = elimination_.blocks.size();
+  if (static_cast<size_t>(A.rows()) != rows || static_cast<size_t>(damping.size()) != rows ||
+      static_cast<size_t>(A.num_blocks() + A.num_off_diagonal()) != blocks) {
+    throw std::invalid_argument(
+        "expected " + std::to_string(rows) + " rows in " + std::to_string(blocks) +
+        " blocks and a damping for each row, got " + std::to_string(A.rows()) + " rows in " +
+        std::to_string(A.num_blocks() + A.num_off_diagonal()) + " blocks and " +
+        std::to_string(damping.size()) + " dampings");
+  }
+  VectorXd placed_damping(damping.size());
+  for (Eigen::Index r = 0; r < damping.size(); ++r) {
+    placed_damping[elimination_.place[r]] = damping[r];
+  }
+  for (int f = 0; f < elimination_.num_fronts(); ++f) {
+    const Front& front = elimination_.fronts[f];
+    PlaceBlocks(A, f);
+    for (int c = 0; c < front.pivots; ++c) {
+      Factor(f)[std::ptrdiff_t{c} * (front.rows() + 1)] += placed_damping[front.pivot + c];
+    }
+    AddUpdates(f);
+    if (!EliminatePivots(front.pivots, front.rows(), Factor(f), Update(f))) return false;
+  }
+  return true;
+}
+
+// Starts the columns of a front with those of A.
+void BlockCholesky::PlaceBlocks(const BlockMatrix& A, int f) {
+  const Front& front = elimination_.fronts[f];
+  const std::ptrdiff_t stride = front.rows();
+  std::fill_n(Factor(f), stride * front.pivots, 0.0);
+  for (int k = front.block; k < elimination_.fronts[f + 1].block; ++k) {
+    const PlacedBlock& placed = elimination_.blocks[k];
+    double* to = Factor(f) + placed.column * stride + placed.row;
+    if (placed.index < 0) {
+      const int block = -1 - placed.index, size = A.size(block);
+      const double* from = A.Diagonal(block);
+      for (int c = 0; c < size; ++c) {
+        for (int r = c; r < size; ++r) to[c * stride + r] = from[c * size + r];
+      }
+      continue;
+    }
+    const auto [i, j] = A.coupled(placed.index);
+    const double* from = A.OffDiagonal(placed.index);
+    const int rows = A.size(i), columns = A.size(j);
+    const std::ptrdiff_t down = placed.transposed ? stride : 1;
+    const std::ptrdiff_t right = placed.transposed ? 1 : stride;
+    for (int c = 0; c < columns; ++c) {
+      for (int r = 0; r < rows; ++r) to[c * right + r * down] = from[c * rows + r];
+    }
+  }
+}
+
+// Starts the update of a front with zeros, and adds those of its children to it and the columns.
+void BlockCholesky::AddUpdates(int f) {
+  const Front& front = elimination_.fronts[f];
+  for (int c = 0; c < front.below; ++c) {
+    std::fill_n(Update(f) + std::ptrdiff_t{c} * (front.below + 1), front.below - c, 0.0);
+  }
+  for (int k = front.child; k < elimination_.fronts[f + 1].child; ++k) {
+    const Child& child = elimination_.children[k];
+    const RowRun* const end = elimination_.runs.data() + elimination_.children[k + 1].run;
+    const std::ptrdiff_t size = elimination_.fronts[child.front].below;
+    for (const RowRun* run = elimination_.runs.data() + child.run; run != end; ++run) {
+      for (int c = 0; c < run->length; ++c) {
+        const double* from = Update(child.front) + (run->from + c) * size;
+        const int column = run->to + c;
+        double* to =
+            column < front.pivots
+                ? Factor(f) + std::ptrdiff_t{column} * front.rows()
+                : Update(f) + std::ptrdiff_t{column - front.pivots} * front.below - front.pivots;
+        for (int r = c; r < run->length; ++r) to[run->to + r] += from[run->from + r];
+        for (const RowRun* next = run + 1; next != end; ++next) {
+          for (int r = 0; r < next->length; ++r) to[next->to + r] += from[next->from + r];
+        }
+      }
+    }
+  }
+}
+
+VectorXd BlockCholesky::Solve(const VectorXd& b) const {
+  const Elimination& e = elimination_;
+  int most_below = 0;
+  for (const Front& front : e.fronts) most_below = std::max(most_below, front.below);
+  VectorXd x(b.size()), workspace(most_below);
+  for (Eigen::Index r = 0; r < b.size(); ++r) x[e.place[r]] = b[r];
+  for (int f = 0; f < e.num_fronts(); ++f) {  // L y = b
+    const Front& front = e.fronts[f];
+    const double* factor = factor_.data() + front.factor;
+    auto y = x.segment(front.pivot, front.pivots);
+    auto below = workspace.head(front.below);
+    PivotsOf(factor, front).triangularView<Eigen::Lower>().solveInPlace(y);
+    below.noalias() = BelowOf(factor, front) * y;
+    for (int r = 0; r < front.below; ++r) x[e.rows[front.row + r]] -= below[r];
+  }
+  for (int f = e.num_fronts() - 1; f >= 0; --f) {  // L^T x = y
+    const Front& front = e.fronts[f];
+    const double* factor = factor_.data() + front.factor;
+    auto y = x.segment(front.pivot, front.pivots);
+    auto below = workspace.head(front.below);
+    for (int r = 0; r < front.below; ++r) below[r] = x[e.rows[front.row + r]];
+    y.noalias() -= BelowOf(factor, front).transpose() * below;
+    PivotsOf(factor, front).transpose().triangularView<Eigen::Upper>().solveInPlace(y);
+  }
+  VectorXd solution(b.size());
+  for (Eigen::Index r = 0; r < b.size(); ++r) solution[r] = x[e.place[r]];
+  return solution;
+}
+
+}  // namespace dqslam

@@ -1,0 +1,216 @@
+// Normal equations of a chain of poses and the objects they saw, eliminated as they come.
+//
+//   minimize sum |r + J x|^2 / 2 over poses x_b .. x_e, each tied to the next by odometry only, and
+//   objects.  A pose is eliminated when the next one comes, an object when its last observation is
+//   in: what is kept is the front, the present pose and the objects that are still awaited.
+//   WindowResult is linear in the poses and square in the objects of the front.
+#pragma once
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <vector>
+
+#include "dqslam/geometry/center_shape.h"
+
+namespace dqslam::online {
+
+template <int k>
+class Chain {
+ public:
+  using Square = Eigen::Matrix<double, k, k>;
+  using Column = Eigen::Matrix<double, k, 1>;
+
+  /// Forgets everything.  `damping` lambda adds lambda diag(J^T J), Marquardt's.
+  void Reset(double damping) {
+    grow_ = 1 + damping;
+    used_ = 0;
+    names_.clear();
+    free_.clear();
+    records_.clear();
+    arena_.clear();
+    front_.topLeftCorner(k, k).setZero();
+    rhs_.template head<k>().setZero();
+  }
+
+  /// A place in the front for a new object; `name` is what BackSubstitute() calls it.
+  int AddObject(int name) {
+    if (!free_.empty()) {
+      const int slot = free_.back();
+      free_.pop_back();
+      names_[slot] = name;
+      return slot;
+    }
+    const int slot = used_++;
+    names_.push_back(name);
+    const int size = k + 9 * used_;
+    if (size > front_.rows()) {
+      const Eigen::Index capacity = std::max<Eigen::Index>(2 * front_.rows(), k + 9 * 8);
+      front_.conservativeResize(capacity, capacity);
+      rhs_.conservativeResize(capacity);
+    }
+    front_.block(At(slot), 0, 9, size).setZero();
+    rhs_.template segment<9>(At(slot)).setZero();
+    return slot;
+  }
+
+  /// Information H and gradient g of the present pose, or of an object.
+  void AddPose(const Square& H, const Column& g) {
+    Grown(H, front_.template block<k, k>(0, 0));
+    rhs_.template head<k>() -= g;
+  }
+  void AddObjectInformation(int slot, const Matrix9d& H, const Vector9d& g) {
+    Grown(H, front_.template block<9, 9>(At(slot), At(slot)));
+    rhs_.template segment<9>(At(slot)) -= g;
+  }
+  /// A residual of the present pose and an object.
+  void AddObservation(int slot,
+                      const Eigen::Vector4d& r,
+                      const Eigen::Matrix<double, 4, k>& by_pose,
+                      const Eigen::Matrix<double, 4, 9>& by_object) {
+    AddPose(by_pose.transpose() * by_pose, by_pose.transpose() * r);
+    AddObjectInformation(slot, by_object.transpose() * by_object, by_object.transpose() * r);
+    front_.template block<9, k>(At(slot), 0).noalias() += by_object.transpose() * by_pose;
+  }
+
+  /// Goes on to the next pose; false where the equations are not positive definite.
+  bool NextPose(const Column& r, const Square& by_from, const Square& by_to) {
+    AddPose(by_from.transpose() * by_from, by_from.transpose() * r);
+    const Square to_next = by_from.transpose() * by_to;
+    if (!EliminatePose(&to_next)) return false;
+    AddPose(by_to.transpose() * by_to, by_to.transpose() * r);
+    return true;
+  }
+
+  bool EliminateObject(int slot) {
+    const int at = At(slot), behind = at + 9, size = k + 9 * used_;
+    const Eigen::LLT<Matrix9d> cholesky(Matrix9d(front_.template block<9, 9>(at, at)));
+    const Vector9d h = cholesky.matrixL().solve(Vector9d(rhs_.template segment<9>(at)));
+    if (cholesky.info() != Eigen::Success || !h.allFinite()) return false;
+    auto& panel = of_object_;
+    panel.resize(size, 9);
+    panel.topRows(at) = front_.block(at, 0, 9, at).transpose();
+    panel.middleRows(at, 9).setZero();
+    panel.bottomRows(size - behind) = front_.block(behind, at, size - behind, 9);
+    front_.block(at, 0, 9, size).setZero();
+    front_.block(behind, at, size - behind, 9).setZero();
+    rhs_.template segment<9>(at).setZero();
+    Downdate<9>(slot, cholesky, h, &panel);
+    free_.push_back(slot);
+    return true;
+  }
+
+  /// Eliminates what is left.
+  bool Finish() {
+    if (!EliminatePose(nullptr)) return false;
+    std::vector<bool> is_free(used_, false);
+    for (const int slot : free_) is_free[slot] = true;
+    for (int slot = used_ - 1; slot >= 0; --slot) {
+      if (!is_free[slot] && !EliminateObject(slot)) return false;
+    }
+    return true;
+  }
+
+  /// The most objects that the front had at a time.
+  int most_objects() const { return used_; }
+
+  /// Steps in the reverse order of elimination: visit_pose(step) from the last to the first, and
+  /// visit_object(name, step).
+  template <typename VisitPose, typename VisitObject>
+  void BackSubstitute(VisitPose&& visit_pose, VisitObject&& visit_object) {
+    solution_ = Eigen::VectorXd::Zero(k + 9 * used_);
+    for (auto record = records_.rbegin(); record != records_.rend(); ++record) {
+      const double* data = arena_.data() + record->offset;
+      if (record->slot < 0) {
+        // The front's first entries are the pose behind this one.
+        const Column step = Substitute<k>(data, record->size);
+        solution_.template head<k>() = step;
+        visit_pose(step);
+      } else {
+        const Vector9d step = Substitute<9>(data, record->size);
+        solution_.template segment<9>(At(record->slot)) = step;
+        visit_object(record->name, step);
+      }
+    }
+  }
+
+ private:
+  struct Entry {
+    int slot;  ///< -1 for a pose
+    int name;  ///< of an object
+    int size;  ///< of the front
+    size_t offset;
+  };
+
+  int At(int slot) const { return k + 9 * slot; }
+
+  template <typename H, typename Block>
+  void Grown(const H& information, Block&& block) {
+    block += information;
+    block.diagonal() += (grow_ - 1) * information.diagonal();
+  }
+
+  // Pose out; `to_next` couples it to the pose that takes its place, if any.
+  bool EliminatePose(const Square* to_next) {
+    const int m = 9 * used_;
+    const Eigen::LLT<Square> cholesky(Square(front_.template topLeftCorner<k, k>()));
+    const Column h = cholesky.matrixL().solve(Column(rhs_.template head<k>()));
+    if (cholesky.info() != Eigen::Success || !h.allFinite()) return false;
+    auto& panel = of_pose_;
+    panel.resize(k + m, k);
+    panel.template topRows<k>() = to_next ? Square(to_next->transpose()) : Square::Zero();
+    panel.bottomRows(m) = front_.block(k, 0, m, k);
+    front_.block(0, 0, k + m, k).setZero();
+    rhs_.template head<k>().setZero();
+    Downdate<k>(-1, cholesky, h, &panel);
+    return true;
+  }
+
+  // The Schur complement of what is eliminated; `panel` couples the front to it.
+  template <int n>
+  void Downdate(int slot,
+                const Eigen::LLT<Eigen::Matrix<double, n, n>>& cholesky,
+                const Eigen::Matrix<double, n, 1>& h,
+                Eigen::Matrix<double, Eigen::Dynamic, n>* panel) {
+    const int size = static_cast<int>(panel->rows());
+    cholesky.matrixU().template solveInPlace<Eigen::OnTheRight>(*panel);
+    for (int column = 0; column < size; ++column) {
+      const Eigen::Matrix<double, n, 1> factor = panel->row(column).transpose();
+      if (factor.isZero(0)) continue;
+      front_.col(column).segment(column, size - column).noalias() -=
+          panel->bottomRows(size - column).lazyProduct(factor);
+    }
+    rhs_.head(size).noalias() -= *panel * h;
+    records_.push_back({slot, slot < 0 ? -1 : names_[slot], size, arena_.size()});
+    const double* L = cholesky.matrixLLT().data();
+    arena_.insert(arena_.end(), L, L + n * n);
+    arena_.insert(arena_.end(), h.data(), h.data() + n);
+    arena_.insert(arena_.end(), panel->data(), panel->data() + n * size);
+  }
+
+  // x = L^-T (h - panel^T x_front)
+  template <int n>
+  Eigen::Matrix<double, n, 1> Substitute(const double* data, int size) const {
+    const Eigen::Map<const Eigen::Matrix<double, n, n>> L(data);
+    const Eigen::Map<const Eigen::Matrix<double, n, 1>> h(data + n * n);
+    const Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, n>> panel(
+        data + n * n + n, size, n);
+    Eigen::Matrix<double, n, 1> x = h;
+    x.noalias() -= panel.transpose() * solution_.head(size);
+    L.template triangularView<Eigen::Lower>().transpose().solveInPlace(x);
+    return x;
+  }
+
+  double grow_ = 1;
+  int used_ = 0;
+  std::vector<int> names_;  ///< of the objects, by slot
+  std::vector<int> free_;
+  std::vector<Entry> records_;
+  std::vector<double> arena_;
+  Eigen::MatrixXd front_ = Eigen::MatrixXd::Zero(k + 9 * 8, k + 9 * 8);
+  Eigen::VectorXd rhs_ = Eigen::VectorXd::Zero(k + 9 * 8);
+  Eigen::VectorXd solution_;
+  Eigen::Matrix<double, Eigen::Dynamic, k> of_pose_;
+  Eigen::Matrix<double, Eigen::Dynamic, 9> of_object_;
+};
+
+}  // namespace dqslam::online

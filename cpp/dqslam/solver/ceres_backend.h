@@ -1,0 +1,17 @@
+// The same stage by ceres::Solve.
+#pragma once
+
+#include "dqslam/solver/trust_region.h"
+
+namespace ceres {
+class Problem;
+}
+
+namespace dqslam {
+
+/// Minimizes from where the parameters of the problem stand.  Throws Interrupted.
+Summary MinimizeByCeres(const TrustRegionOptions& options,
+                        const Monitor& monitor,
+                        ceres::Problem* problem);
+
+}  // namespace dqslam

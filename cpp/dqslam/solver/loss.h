@@ -1,0 +1,73 @@
+// Robust losses on whole boxes, beside those that Ceres brings, and switchable constraints.
+//   s    squared norm of a box's residual: chi-square with 4 degrees of freedom for a right box
+//   phi  the chi-square from which on a box is doubted
+#pragma once
+
+#include <ceres/loss_function.h>
+
+#include <memory>
+
+#include "dqslam/costs/autodiff_cost.h"
+#include "dqslam/problem/options.h"
+
+namespace dqslam {
+
+/// Dynamic covariance scaling, Agarwal et al. 2013: weight (2 phi / (phi + s))^2 beyond phi, hence
+/// rho(s) = 3 phi - 4 phi^2 / (phi + s) there.
+class DcsLoss : public ceres::LossFunction {
+ public:
+  explicit DcsLoss(double phi) : phi_(phi) {}
+  void Evaluate(double s, double rho[3]) const override {
+    if (s <= phi_) {
+      rho[0] = s;
+      rho[1] = 1;
+      rho[2] = 0;
+      return;
+    }
+    const double scale = 2 * phi_ / (phi_ + s);
+    rho[0] = 3 * phi_ - 2 * phi_ * scale;
+    rho[1] = scale * scale;
+    rho[2] = -2 * rho[1] / (phi_ + s);
+  }
+
+ private:
+  double phi_;
+};
+
+/// The loss function of a stage; null for the plain sum of squares, which switchable constraints
+/// and graduated non-convexity weight themselves.
+inline std::unique_ptr<ceres::LossFunction> MakeLoss(Loss loss, const SolveOptions& options) {
+  switch (loss) {
+    case Loss::kHuber:
+      return std::make_unique<ceres::HuberLoss>(options.loss_scale);
+    case Loss::kCauchy:
+      return std::make_unique<ceres::CauchyLoss>(options.loss_scale);
+    case Loss::kDcs:
+      return std::make_unique<DcsLoss>(options.outlier_chi_square);
+    case Loss::kNone:
+    case Loss::kSwitchable:
+    case Loss::kGncTls:
+    case Loss::kGncGm:
+      break;
+  }
+  return nullptr;
+}
+
+/// Switchable constraints, Suenderhauf & Protzel 2012:  r = (w e, (1 - w) sqrt(phi)).
+/// Blocks: those of the box cost, and the switch [1].  Residual: [5].  Fails where the box cost
+/// does.
+template <typename Pose, typename BoxResidual>
+struct SwitchedCost : AutoDiffCost<SwitchedCost<Pose, BoxResidual>, 5, Pose::kSize, 9, 1> {
+  BoxResidual box;
+  double sqrt_phi;
+
+  template <typename T>
+  bool operator()(const T* pose, const T* landmark, const T* w, T* residual) const {
+    if (!box(pose, landmark, residual)) return false;
+    for (int edge = 0; edge < 4; ++edge) residual[edge] *= *w;
+    residual[4] = (T(1) - *w) * T(sqrt_phi);
+    return true;
+  }
+};
+
+}  // namespace dqslam

@@ -1,0 +1,105 @@
+#include "dqslam/solver/path_step.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+
+#include "dqslam/geometry/box_derivatives.h"
+#include "dqslam/geometry/manifolds.h"
+
+namespace dqslam {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+// The tangent of a pose in space, in the frame of the pose.
+struct Twist {
+  Vector3d translation, rotation;
+};
+
+template <typename Pose>
+Twist InSpace(const double* tangent) {
+  if constexpr (Pose::kModel == PoseModel::kSe2) {
+    return {Vector3d(tangent[0], tangent[1], 0), Vector3d(0, 0, tangent[2])};
+  } else {
+    return {Vector3d(tangent), Vector3d(tangent + 3)};
+  }
+}
+
+template <typename Pose>
+Eigen::Matrix<double, Pose::kTangentSize, 1> OfPose(const Twist& twist) {
+  if constexpr (Pose::kModel == PoseModel::kSe2) {
+    return {twist.translation.x(), twist.translation.y(), twist.rotation.z()};
+  } else {
+    return (Eigen::Matrix<double, 6, 1>() << twist.translation, twist.rotation).finished();
+  }
+}
+
+// The tangent of an ellipsoid S = L L^T that turns about its center, dS = [w] S - S [w]; what of
+// L^-1 dS L^-T is below the diagonal, and half of what is on it, as in EllipsoidManifold::Minus.
+Vector9d TurnTangent(const Matrix3d& L, const Vector3d& rotation) {
+  Matrix3d turned;
+  for (int column = 0; column < 3; ++column) turned.col(column) = rotation.cross(L.col(column));
+  const Matrix3d X = L.triangularView<Eigen::Lower>().solve(turned);
+  Matrix3d lower = (X + X.transpose()).triangularView<Eigen::Lower>();
+  lower.diagonal() *= 0.5;
+  const Matrix3d dL = L * lower;
+  Vector9d tangent;
+  tangent << 0, 0, 0, lower.diagonal(), dL(1, 0), dL(2, 0), dL(2, 1);
+  return tangent;
+}
+
+}  // namespace
+
+// With z the pose seen from the previous one, T' = T (1 + tangent) gives to first order
+// z' = z (1 + own - Ad(z^-1) of the previous).
+template <typename Pose>
+void PlusBehind(const MovedPose& previous,
+                const double* pose,
+                const double* tangent,
+                double* moved) {
+  double link[Pose::kSize], changed[Pose::kSize];
+  Pose::Between(previous.before, pose, link);
+  const Rigid<double> z = Pose::template WorldFromRobot<double>(link);
+  const Twist base = InSpace<Pose>(previous.tangent), own = InSpace<Pose>(tangent);
+  const Vector3d carried = base.translation + base.rotation.cross(z.translation);
+  const auto change = OfPose<Pose>({own.translation - z.rotation.transpose() * carried,
+                                    own.rotation - z.rotation.transpose() * base.rotation});
+  Plus<Pose>(link, change.data(), changed);
+  Pose::Compose(previous.after, changed, moved);
+  Pose::Normalize(moved);
+}
+
+template <typename Pose>
+bool PlusBeside(const MovedPose& viewer,
+                const double* ellipsoid,
+                const double* tangent,
+                double* moved) {
+  const Rigid<double> before = Pose::template WorldFromRobot<double>(viewer.before);
+  const Rigid<double> after = Pose::template WorldFromRobot<double>(viewer.after);
+  const Twist twist = InSpace<Pose>(viewer.tangent);
+  const Vector3d turn = before.rotation * twist.rotation;
+  const Vector3d arm = Vector3d(ellipsoid) - before.translation;
+  Vector9d change = Eigen::Map<const Vector9d>(tangent) -
+                    TurnTangent(Unpacked<EllipsoidModel>(ellipsoid).factor, turn);
+  change.head<3>() -= before.rotation * twist.translation + turn.cross(arm);
+  Vector9d changed;
+  if (!EllipsoidManifold().Plus(ellipsoid, change.data(), changed.data())) return false;
+
+  const Matrix3d after_from_before = after.rotation * before.rotation.transpose();
+  const Unpacked<EllipsoidModel> straight(changed.data());
+  const Matrix3d turned = after_from_before * straight.factor;
+  const Eigen::LLT<Matrix3d> cholesky(turned * turned.transpose());
+  const Matrix3d L = cholesky.matrixL();
+  Eigen::Map<Vector9d>(moved, kLandmarkSize)
+      << after.translation + after_from_before * (changed.head<3>() - before.translation),
+      L.diagonal().array().log(), L(1, 0), L(2, 0), L(2, 1);
+  return cholesky.info() == Eigen::Success;
+}
+
+template void PlusBehind<Se2>(const MovedPose&, const double*, const double*, double*);
+template void PlusBehind<Se3>(const MovedPose&, const double*, const double*, double*);
+template bool PlusBeside<Se2>(const MovedPose&, const double*, const double*, double*);
+template bool PlusBeside<Se3>(const MovedPose&, const double*, const double*, double*);
+
+}  // namespace dqslam

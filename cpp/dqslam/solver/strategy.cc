@@ -1,0 +1,128 @@
+#include "dqslam/solver/strategy.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace dqslam {
+namespace {
+
+using Eigen::VectorXd;
+
+// The constants are those of Ceres, but for two.  Its trust region grows threefold at most.  And it
+// damps dog-leg's Gauss-Newton step by 1e-8 of the curvature, which then creeps along the weakest
+// modes of a long path: they have 3e-15 of it at 200 000 poses.
+constexpr double kSmallestScale = 1e-6, kLargestScale = 1e32;
+constexpr double kLargestRadius = 1e16;
+constexpr double kDampedRadius = 1e4;  // where Levenberg-Marquardt starts
+constexpr double kFastestGrowth = 10;  // of the radius, in one step
+constexpr double kLeastDamping = 1e-16, kMostDamping = 1;
+
+class LevenbergMarquardt : public Strategy {
+ public:
+  using Strategy::Strategy;
+
+  bool Step(const NormalEquations& equations, bool is_new, VectorXd* step) override {
+    if (is_new) curvature_ = Curvature(equations);
+    return Solve(equations, curvature_ / radius_, step);
+  }
+  void Accept(double gain_ratio) override {
+    const double growth = 1 - std::pow(2 * gain_ratio - 1, 3);
+    radius_ = std::min(radius_ / std::max(1 / kFastestGrowth, growth), kLargestRadius);
+    shrinkage_ = 2;
+  }
+  void Reject() override {
+    radius_ /= shrinkage_;
+    shrinkage_ *= 2;
+  }
+  void RejectInvalid() override { Reject(); }
+
+ private:
+  VectorXd curvature_;
+  double shrinkage_ = 2;
+};
+
+// Powell's: where the whole Gauss-Newton step fails, shorter ones cost no further factorization.
+class Dogleg : public Strategy {
+ public:
+  using Strategy::Strategy;
+
+  bool Step(const NormalEquations& equations, bool is_new, VectorXd* step) override {
+    if (is_new || stale_) {
+      scale_ = Curvature(equations).cwiseSqrt();
+      gradient_ = equations.gradient.cwiseQuotient(scale_);
+      const VectorXd uphill = gradient_.cwiseQuotient(scale_);
+      cauchy_ = gradient_.squaredNorm() / uphill.dot(equations.H.Multiply(uphill));
+      if (!FindGaussNewton(equations)) return false;
+      stale_ = false;
+    }
+    *step = Within().cwiseQuotient(scale_);
+    return true;
+  }
+  void Accept(double gain_ratio) override {
+    if (gain_ratio < kPoorGain) radius_ *= 0.5;
+    if (gain_ratio > kGoodGain) radius_ = std::max(radius_, 3 * step_norm_);
+    damping_ = std::max(kLeastDamping, 0.2 * damping_);
+  }
+  bool IsLimited() const override { return gauss_newton_.norm() > radius_; }
+  void Reject() override { radius_ = 0.5 * step_norm_; }
+  void RejectInvalid() override {
+    damping_ *= 10;
+    stale_ = true;
+  }
+
+ private:
+  bool FindGaussNewton(const NormalEquations& equations) {
+    for (; damping_ < kMostDamping; damping_ *= 10) {
+      if (Solve(equations, damping_ * scale_.cwiseAbs2(), &gauss_newton_)) {
+        gauss_newton_.array() *= scale_.array();
+        return true;
+      }
+    }
+    return false;
+  }
+
+  // The point of the dog-leg path at the radius, scaled.
+  VectorXd Within() {
+    if (gauss_newton_.norm() <= radius_) {
+      step_norm_ = gauss_newton_.norm();
+      return gauss_newton_;
+    }
+    step_norm_ = radius_;
+    const VectorXd downhill = -cauchy_ * gradient_;
+    if (downhill.norm() >= radius_) return downhill * (radius_ / downhill.norm());
+    const VectorXd leg = gauss_newton_ - downhill;
+    const double a = leg.squaredNorm(), b = downhill.dot(leg);
+    const double c = radius_ * radius_ - downhill.squaredNorm();
+    const double root = std::sqrt(b * b + a * c);
+    return downhill + (b <= 0 ? (root - b) / a : c / (b + root)) * leg;
+  }
+
+  VectorXd scale_, gradient_, gauss_newton_;
+  double cauchy_ = 0, damping_ = kLeastDamping, step_norm_ = 0;
+  bool stale_ = false;
+};
+
+}  // namespace
+
+VectorXd Strategy::Curvature(const NormalEquations& equations) {
+  const VectorXd diagonal = equations.H.diagonal();
+  if (first_scale_.size() == 0) first_scale_ = (1 + diagonal.array().sqrt()).inverse().square();
+  return (diagonal.array() * first_scale_.array())
+      .max(kSmallestScale)
+      .min(kLargestScale)
+      .matrix()
+      .cwiseQuotient(first_scale_);
+}
+
+bool Strategy::Solve(const NormalEquations& equations, const VectorXd& damping, VectorXd* step) {
+  if (!cholesky_.Factorize(equations.H, damping)) return false;
+  *step = cholesky_.Solve(-equations.gradient);
+  return step->allFinite();
+}
+
+std::unique_ptr<Strategy> MakeStrategy(Minimizer minimizer, const BlockMatrix& H) {
+  if (minimizer == Minimizer::kDogleg) return std::make_unique<Dogleg>(H, kLargestRadius);
+  return std::make_unique<LevenbergMarquardt>(H, kDampedRadius);
+}
+
+}  // namespace dqslam

@@ -1,0 +1,178 @@
+#include "dqslam/solver/trust_region.h"
+
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <sstream>
+
+#include "dqslam/solver/strategy.h"
+
+namespace dqslam {
+namespace {
+
+using Eigen::VectorXd;
+
+constexpr double kSmallestRadius = 1e-32;
+constexpr double kSufficientDecrease = 1e-3;  // of the decrease that the model predicts
+constexpr double kTinyStep = 1e-12;           // relative to the values
+constexpr double kTinyGradient = 1e-12;
+// An invalid step is a step into impossible geometry: shrink and go on.
+constexpr int kMaxInvalidSteps = 50;
+
+// Adds the time of its life to a counter.
+class Stopwatch {
+ public:
+  explicit Stopwatch(double* seconds) : seconds_(*seconds) {}
+  ~Stopwatch() {
+    seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
+  }
+
+ private:
+  double& seconds_;
+  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
+};
+
+// Where a step leads.
+class Trial {
+ public:
+  explicit Trial(const LeastSquares& problem) : problem_(problem) {}
+
+  // Goes straight, or along the path where straight wins little of the decrease that the model
+  // predicts, and less. Returns the decrease: minus infinity where a residual is undefined.
+  double Take(const VectorXd& values, const VectorXd& step, double predicted) {
+    const double before = problem_.equations().cost;
+    cost_ = CostOf(problem_.Plus(values, step, &reached_), reached_);
+    if (!(before - cost_ > kPoorGain * predicted)) {
+      const double along_path =
+          CostOf(problem_.RetractAlongPath(values, step, &along_path_), along_path_);
+      if (along_path < cost_) {
+        cost_ = along_path;
+        reached_.swap(along_path_);
+      }
+    }
+    return before - cost_;
+  }
+  double cost() const { return cost_; }
+  VectorXd& reached() { return reached_; }
+
+ private:
+  double CostOf(bool possible, const VectorXd& values) const {
+    double cost = 0;
+    return possible && problem_.Cost(values, &cost) ? cost
+                                                    : std::numeric_limits<double>::infinity();
+  }
+
+  const LeastSquares& problem_;
+  VectorXd reached_, along_path_;
+  double cost_ = 0;
+};
+
+std::string Message(const char* what, double value, const char* relation, double limit) {
+  std::ostringstream message;
+  message << what << ": " << value << ' ' << relation << ' ' << limit;
+  return message.str();
+}
+
+double LargestOf(const VectorXd& vector) {
+  return vector.size() == 0 ? 0 : vector.lpNorm<Eigen::Infinity>();
+}
+
+}  // namespace
+
+Summary Minimize(const TrustRegionOptions& options,
+                 const Monitor& monitor,
+                 LeastSquares* least_squares,
+                 VectorXd* values) {
+  Summary summary;
+  const Stopwatch total(&summary.seconds);
+  LeastSquares& problem = *least_squares;
+  const NormalEquations& equations = problem.equations();
+  bool defined = false;
+  {
+    const Stopwatch evaluation(&summary.evaluation_seconds);
+    defined = problem.Linearize(*values);
+  }
+  if (!defined || !std::isfinite(equations.cost)) {
+    summary.initial_cost = summary.final_cost = std::numeric_limits<double>::infinity();
+    summary.message = "a residual is undefined at the start";
+    return summary;
+  }
+  summary.initial_cost = summary.final_cost = equations.cost;
+  summary.gradient_norm_start = summary.gradient_norm_end = LargestOf(equations.gradient);
+  const auto converge = [&summary](std::string message) {
+    summary.converged = true;
+    summary.message = std::move(message);
+  };
+  if (summary.gradient_norm_start <= kTinyGradient) {
+    converge(Message("gradient", summary.gradient_norm_start, "<=", kTinyGradient));
+    return summary;
+  }
+
+  std::unique_ptr<Strategy> strategy;
+  {
+    const Stopwatch linear_solver(&summary.linear_solver_seconds);
+    strategy = MakeStrategy(options.minimizer, equations.H);
+  }
+  VectorXd step;
+  Trial trial(problem);
+  bool is_new = true;
+  int invalid_steps = 0;
+  while (!summary.converged) {
+    if (monitor && !monitor()) throw Interrupted();
+    if (summary.iterations == options.max_iterations) {
+      summary.message = "stopped after " + std::to_string(options.max_iterations) + " iterations";
+      break;
+    }
+    if (strategy->radius() < kSmallestRadius) {
+      converge(Message("trust region", strategy->radius(), "<", kSmallestRadius));
+      break;
+    }
+    ++summary.iterations;
+    double predicted = 0;
+    {
+      const Stopwatch linear_solver(&summary.linear_solver_seconds);
+      if (strategy->Step(equations, is_new, &step)) {
+        predicted = -step.dot(equations.gradient + 0.5 * equations.H.Multiply(step));
+      }
+    }
+    is_new = false;
+    if (!(predicted > 0)) {
+      ++summary.rejected_steps;
+      strategy->RejectInvalid();
+      if (++invalid_steps < kMaxInvalidSteps) continue;
+      summary.message = "no valid step was found";
+      break;
+    }
+    invalid_steps = 0;
+    if (step.norm() <= kTinyStep * (values->norm() + kTinyStep)) {
+      converge(Message("step", step.norm(), "<=", kTinyStep * values->norm()));
+      break;
+    }
+
+    const Stopwatch evaluation(&summary.evaluation_seconds);
+    const double decrease = trial.Take(*values, step, predicted);
+    if (!strategy->IsLimited() &&
+        std::abs(decrease) <= options.function_tolerance * equations.cost) {
+      converge(Message(
+          "relative change of cost", decrease / equations.cost, "<=", options.function_tolerance));
+    }
+    if (!(decrease > kSufficientDecrease * predicted)) {
+      ++summary.rejected_steps;
+      strategy->Reject();
+      continue;
+    }
+    strategy->Accept(decrease / predicted);
+    values->swap(trial.reached());
+    summary.final_cost = trial.cost();
+    if (summary.converged) break;  // the derivatives there are not needed
+    problem.Linearize(*values);
+    is_new = true;
+    summary.gradient_norm_end = LargestOf(equations.gradient);
+    if (summary.gradient_norm_end <= kTinyGradient) {
+      converge(Message("gradient", summary.gradient_norm_end, "<=", kTinyGradient));
+    }
+  }
+  return summary;
+}
+
+}  // namespace dqslam

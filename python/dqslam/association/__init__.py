@@ -1,0 +1,13 @@
+"""Association: which boxes show the same object."""
+
+from dqslam.association.association import FINAL as FINAL
+from dqslam.association.association import UNSURE as UNSURE
+from dqslam.association.association import Association as Association
+from dqslam.association.association import associate as associate
+from dqslam.association.association import not_found as not_found
+from dqslam.association.gating import CHI2_GATE as CHI2_GATE
+from dqslam.association.gating import box_chi2 as box_chi2
+from dqslam.association.rays import cameras_by_odometry as cameras_by_odometry
+from dqslam.association.rays import cast_rays as cast_rays
+from dqslam.association.thinning import fill_in as fill_in
+from dqslam.association.tracklets import link_tracklets as link_tracklets

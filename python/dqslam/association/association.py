@@ -1,0 +1,186 @@
+"""Which boxes show the same object: the whole of it, from a recording to objects and poses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dqslam import _core
+from dqslam._checks import reject_rows
+from dqslam.association.follow import Follower
+from dqslam.association.initiation import FEWEST_VIEWS
+from dqslam.association.keyframes import choose_keyframes
+from dqslam.association.noise import StepNoise
+from dqslam.association.refine import reassign, refine
+from dqslam.association.scene_map import SceneMap
+from dqslam.association.thinning import fill_in, thin_recording
+from dqslam.association.tracklets import link_tracklets
+from dqslam.assumptions import BoxNoise, SizePrior, SizePriors
+from dqslam.recording import Recording
+
+# Trust in ids that are final, and the most where they are not: of tracklets that are linked in the
+# image, 1 in 10 goes over to another object.
+FINAL, UNSURE = 1.0, 0.9
+
+
+@dataclass(frozen=True, eq=False)
+class Association:
+    """Which boxes show the same object, and the estimate that says so."""
+
+    object_id: NDArray[np.int64]
+    """Of each box of the recording, -1 for none, shape (m,)."""
+    keyframes: NDArray[np.int64]
+    """Rows of the poses whose boxes were used, shape (n,)."""
+    scene: SceneMap
+    """Poses of the keyframes and objects; row ``j`` is the object ``ids[j]``."""
+    ids: NDArray[np.int64]
+    """Ids of the objects, -1 for one that was given up, shape (o,)."""
+    left_out: dict[int, str]
+    """Ids of objects that do not fit a world at rest, and why. Their boxes keep the ids."""
+
+
+def associate(
+    recording: Recording,
+    *,
+    trust: float = UNSURE,
+    mode: _core.Mode = _core.Mode.SLAM,
+    box_noise: BoxNoise | None = None,
+    size_prior: SizePrior | SizePriors | None = None,
+    estimates_noise: bool = True,
+    progress: Callable[[float], None] = lambda share: None,
+) -> Association:
+    """Find out which boxes show the same object.
+
+    Boxes are linked in the image to tracklets, and of a video the images from new viewpoints are
+    chosen. Along the path, the tracklets are given to the objects that they clearly show, by the
+    joint covariance of pose and object; objects start from tracklets, or from boxes that meet in
+    space. With the whole path known, all boxes are assigned again. Relative positions take no part.
+
+    Parameters
+    ----------
+    recording
+        Its object ids are those of a tracker; -1 where there are none.
+    trust
+        The probability that an id stays with its object, in (0.5, 1]. At 1 ids are final.
+    mode
+        MAPPING takes the odometry for the truth.
+    box_noise, size_prior
+        What to assume; the size by default what the objects found have.
+    estimates_noise
+        Whether the level of the odometry's noise is estimated instead of believed.
+    progress
+        Is told the share of the work that is done.
+
+    Raises
+    ------
+    ValueError
+        For a trust out of range, or at 1 for boxes without an id.
+    """
+    if not 0.5 < trust <= FINAL:
+        raise ValueError(f"trust in ids is {trust:g}, not above 0.5 and at most 1")
+    claims = recording.detections.object_id
+    if trust == FINAL:
+        reject_rows("detections.object_id", claims < 0, "final ids are needed: the box has none")
+    recording = replace(recording, positions=None)
+    tracklet = link_tracklets(recording, claims=claims)
+    keyframes = choose_keyframes(recording, tracklet)
+    used = np.isin(recording.detections.pose, keyframes)
+    thin = thin_recording(recording, keyframes)
+    scene = SceneMap(
+        thin,
+        tracklet[used],
+        box_noise=box_noise or BoxNoise(),
+        size_prior=size_prior,
+        step_noise=StepNoise.between(recording, keyframes) if estimates_noise else None,
+        mode=mode,
+    )
+    follower = Follower(scene, trust=trust)
+    follower.follow(lambda share: progress(0.7 * share))
+    refine(follower, lambda share: progress(0.7 + 0.2 * share))
+    if trust == FINAL:
+        object_id, ids = claims.copy(), _ids_of(scene, claims[used])
+    else:
+        everything = _with_all_images(scene, recording, keyframes, tracklet, used)
+        reassign(everything, follower.bonus)
+        object_id, ids = _numbered(everything.box_object, len(scene.ellipsoids))
+    progress(1.0)
+    left_out = {int(ids[row]): why for row, why in scene.left_out.items() if ids[row] >= 0}
+    if trust == FINAL:
+        left_out |= not_found(recording, ids, used)
+    return Association(object_id, keyframes, scene, ids, dict(sorted(left_out.items())))
+
+
+def _ids_of(scene: SceneMap, claims: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the final id of each object, from those of the boxes (b,); -1 of one given up."""
+    ids = np.full(len(scene.ellipsoids), -1)
+    claimed = scene.box_object >= 0
+    ids[scene.box_object[claimed]] = claims[claimed]
+    return ids
+
+
+def not_found(
+    recording: Recording, ids: NDArray[np.int64], used: NDArray[np.bool_]
+) -> dict[int, str]:
+    """Say of final ids that are not in the map (ids, (o,)) why; ``used`` are keyframes' boxes."""
+    claims, pose = recording.detections.object_id, recording.detections.pose
+    reasons = {}
+    for name in np.setdiff1d(claims, ids).tolist():
+        views = len(np.unique(pose[used & (claims == name)]))
+        reasons[name] = (
+            f"seen from {views} viewpoints, {FEWEST_VIEWS} are needed"
+            if views < FEWEST_VIEWS
+            else "no place explains its boxes, or they leave its distance open"
+        )
+    return reasons
+
+
+def _with_all_images(
+    scene: SceneMap,
+    recording: Recording,
+    keyframes: NDArray[np.int64],
+    tracklet: NDArray[np.int64],
+    used: NDArray[np.bool_],
+) -> SceneMap:
+    """Return the map with the poses and boxes between the keyframes."""
+    everything = SceneMap(
+        recording,
+        _cut_alike(tracklet, recording.detections.pose, used, scene.tracklet),
+        box_noise=scene.box_noise,
+        size_prior=scene.size_prior,
+    )
+    everything.poses = fill_in(recording, keyframes, scene.poses)
+    everything.ellipsoids = scene.ellipsoids
+    everything.votes = scene.votes.copy()
+    everything.object_of_tracklet = dict(scene.object_of_tracklet)
+    return everything
+
+
+def _cut_alike(
+    tracklet: NDArray[np.int64],
+    pose: NDArray[np.int64],
+    used: NDArray[np.bool_],
+    cut: NDArray[np.int64],
+) -> NDArray[np.int64]:
+    """Cut tracklets (m,) at the poses where those of the used boxes (u,) were cut."""
+    result = tracklet.copy()
+    known_pose = pose[used]
+    for number in np.unique(tracklet[used][cut != tracklet[used]]).tolist():
+        rows = np.flatnonzero(tracklet == number)
+        known = np.flatnonzero(tracklet[used] == number)
+        known = known[np.argsort(known_pose[known], kind="stable")]
+        last = np.searchsorted(known_pose[known], pose[rows], side="right") - 1
+        result[rows] = cut[known[last.clip(min=0)]]
+    return result
+
+
+def _numbered(
+    box_object: NDArray[np.int64], count: int
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return ids by order of first boxes: of boxes (m,), and of rows (count,); -1 for none."""
+    rows, first = np.unique(box_object[box_object >= 0], return_index=True)
+    ids = np.full(count + 1, -1)
+    ids[rows[np.argsort(first)]] = np.arange(len(rows))
+    return ids[box_object], ids[:-1]

@@ -1,0 +1,210 @@
+"""Tracklets: boxes of one object in successive images, linked by where they are in the image.
+
+A tracklet ends where there is doubt: joining two later, in space, is easier than cutting one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dqslam import _core
+from dqslam.association.images import group_by_pose
+from dqslam.association.rays import cameras_by_odometry, points_at_depth_one
+from dqslam.metrics import box_iou
+from dqslam.recording import Recording
+
+# A box overlaps the place predicted for it by at least this (intersection over union).
+LEAST_OVERLAP = 0.3
+# Without overlap: this many box sides away, by this factor larger or smaller, and nothing else of
+# its class twice as far around.
+FARTHEST_SIDES = 1.0
+LARGEST_GROWTH = 1.6
+# A tracked object is seen again within so many images, or taken for lost.
+LONGEST_GAP = 5
+
+
+@dataclass
+class _Track:
+    """What is known of a tracklet when the next image comes."""
+
+    number: int
+    class_id: int
+    claim: int
+    """Id that a tracker gave, -1 for none."""
+    pose: int
+    camera: NDArray[np.float64]
+    """world_from_camera of that pose by odometry, shape (7,)."""
+    box: NDArray[np.float64]
+    drift: NDArray[np.float64] = field(default_factory=lambda: np.zeros(2))
+    """Motion of the center per image beside what the camera's turning explains, in pixels."""
+
+    def follow(
+        self,
+        pose: int,
+        camera: NDArray[np.float64],
+        box: NDArray[np.float64],
+        predicted: NDArray[np.float64],
+    ) -> None:
+        """Go on with a box, and learn from where it was predicted."""
+        off = _centers(box) - _centers(predicted)
+        self.drift = self.drift + 0.5 * off / (pose - self.pose)
+        self.pose, self.camera, self.box = pose, camera, box
+
+
+class Linker:
+    """Links the boxes of one image after the other.
+
+    The box of a track is predicted by the turn of the camera, which odometry knows well, and the
+    steady motion of the box beside it. Pairs of least distance are chosen over the whole image.
+    """
+
+    def __init__(self, camera: _core.Camera) -> None:
+        """Begin without tracks."""
+        self._camera = camera
+        self._tracks: list[_Track] = []
+        self._of_claim: dict[int, int] = {}
+        self.started = 0
+        """Numbers below this are taken."""
+
+    def link(
+        self,
+        pose: int,
+        camera: NDArray[np.float64],
+        box: NDArray[np.float64],
+        class_id: NDArray[np.int64],
+        claims: NDArray[np.int64],
+    ) -> NDArray[np.int64]:
+        """Return the number of the tracklet of each box of an image, shape (b,).
+
+        Parameters
+        ----------
+        pose
+            Row of the pose, above those before.
+        camera
+            world_from_camera by odometry, shape (7,).
+        box, class_id
+            Shapes (b, 4) and (b,).
+        claims
+            Ids (b,) that a tracker gave, -1 for none: all boxes of an id are one tracklet.
+        """
+        self._tracks = [track for track in self._tracks if pose - track.pose <= LONGEST_GAP]
+        tracklet = np.full(len(box), -1, dtype=np.int64)
+        predicted = _predict(self._tracks, pose, camera, self._camera)
+        own = np.array([(track.class_id, track.claim) for track in self._tracks]).reshape(-1, 2)
+        allowed = (own[:, None] == np.column_stack([class_id, claims])).all(axis=2)
+        for i, j in _match(predicted, box, allowed):
+            self._tracks[i].follow(pose, camera, box[j], predicted[i])
+            tracklet[j] = self._tracks[i].number
+        for j in np.flatnonzero(tracklet < 0).tolist():
+            claim = int(claims[j])
+            number = self._of_claim.get(claim)
+            if number is None:
+                number = self.new_number()
+            if claim >= 0:
+                self._of_claim[claim] = number
+            self._tracks.append(_Track(number, int(class_id[j]), claim, pose, camera, box[j]))
+            tracklet[j] = number
+        return tracklet
+
+    def new_number(self) -> int:
+        """Return a number that no tracklet has."""
+        self.started += 1
+        return self.started - 1
+
+    def cut(self, tracklet: int, number: int) -> None:
+        """Go on with a tracklet under another number."""
+        for track in self._tracks:
+            if track.number == tracklet:
+                track.number = number
+        for claim, own in self._of_claim.items():
+            if own == tracklet:
+                self._of_claim[claim] = number
+
+
+def link_tracklets(
+    recording: Recording, *, claims: NDArray[np.int64] | None = None
+) -> NDArray[np.int64]:
+    """Return the number of the tracklet of each box, shape (m,), in order of their first boxes.
+
+    ``claims`` are the ids (m,) that a tracker gave, -1 for none: all boxes of an id are one
+    tracklet.
+    """
+    detections = recording.detections
+    cameras = cameras_by_odometry(recording)
+    claims = np.full(len(detections), -1) if claims is None else claims
+    tracklet = np.full(len(detections), -1, dtype=np.int64)
+    linker = Linker(recording.camera)
+    for pose, rows in group_by_pose(detections.pose):
+        tracklet[rows] = linker.link(
+            pose, cameras[pose], detections.box[rows], detections.class_id[rows], claims[rows]
+        )
+    return np.asarray(np.unique(tracklet, return_inverse=True)[1])
+
+
+def _centers(box: NDArray[np.float64]) -> NDArray[np.float64]:
+    return 0.5 * (box[..., :2] + box[..., 2:])
+
+
+def _predict(
+    tracks: list[_Track], pose: int, seen_from: NDArray[np.float64], camera: _core.Camera
+) -> NDArray[np.float64]:
+    """Return where the boxes of tracks are expected in the image of a pose, shape (t, 4)."""
+    if not tracks:
+        return np.zeros((0, 4))
+    box = np.array([track.box for track in tracks])
+    last = np.array([track.pose for track in tracks])
+    drift = np.array([track.drift for track in tracks])
+    turns = np.array([track.camera for track in tracks])
+    turns[:, :3] = 0.0
+    here = np.repeat(seen_from[None], len(box), axis=0)
+    here[:, :3] = 0.0
+    se3 = _core.PoseModel.SE3
+    far = _core.compose(se3, turns, points_at_depth_one(camera, _centers(box)))
+    seen = _core.between(se3, here, far)[:, :3]
+    focal, middle = np.array([camera.fx, camera.fy]), np.array([camera.cx, camera.cy])
+    expected = middle + focal * seen[:, :2] / seen[:, 2:].clip(min=0.1)
+    shift = expected - _centers(box) + drift * (pose - last)[:, None]
+    return np.asarray(box + np.tile(shift, (1, 2)))
+
+
+def _match(
+    predicted: NDArray[np.float64], box: NDArray[np.float64], allowed: NDArray[np.bool_]
+) -> list[tuple[int, int]]:
+    """Pair tracks (t, 4) with boxes (b, 4) where ``allowed`` (t, b): by overlap, then the rest."""
+    from scipy.optimize import linear_sum_assignment
+
+    if not len(predicted) or not len(box):
+        return []
+    overlap = np.where(allowed, box_iou(predicted[:, None], box), 0.0)
+    rows, columns = linear_sum_assignment(-overlap)
+    pairs = [
+        (i, j)
+        for i, j in zip(rows.tolist(), columns.tolist(), strict=True)
+        if overlap[i, j] >= LEAST_OVERLAP
+    ]
+    return pairs + _only_choices(pairs, predicted, box, allowed)
+
+
+def _only_choices(
+    pairs: list[tuple[int, int]],
+    predicted: NDArray[np.float64],
+    box: NDArray[np.float64],
+    allowed: NDArray[np.bool_],
+) -> list[tuple[int, int]]:
+    """Pair what is left where neither has another choice around."""
+    size, new_size = predicted[:, 2:] - predicted[:, :2], box[:, 2:] - box[:, :2]
+    offset = np.linalg.norm(_centers(predicted)[:, None] - _centers(box), axis=2)
+    distance = np.where(allowed, offset / np.sqrt(size.prod(axis=1))[:, None], np.inf)
+    growth = np.abs(np.log(size[:, None] / new_size)).max(axis=2)
+    near = distance < 2 * FARTHEST_SIDES
+    fits = (distance < FARTHEST_SIDES) & (growth < np.log(LARGEST_GROWTH))
+    alone = (near.sum(axis=1) == 1)[:, None] & (near.sum(axis=0) == 1)
+    tracks_taken, boxes_taken = {i for i, _ in pairs}, {j for _, j in pairs}
+    return [
+        (i, j)
+        for i, j in np.argwhere(fits & alone).tolist()
+        if i not in tracks_taken and j not in boxes_taken
+    ]

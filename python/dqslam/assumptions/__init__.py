@@ -1,0 +1,7 @@
+"""What is assumed before anything is seen: sizes of objects, noise of boxes and odometry."""
+
+from dqslam.assumptions.noise import BoxNoise as BoxNoise
+from dqslam.assumptions.noise import OdometryNoise as OdometryNoise
+from dqslam.assumptions.sizes import SizePrior as SizePrior
+from dqslam.assumptions.sizes import SizePriors as SizePriors
+from dqslam.assumptions.sizes import load_size_priors as load_size_priors

@@ -1,0 +1,56 @@
+"""How far measurements are believed to be off: the edges of boxes, the steps of odometry."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dqslam._checks import Floats
+
+# Odometry outside of this is exact or worthless, and squares badly.
+SIGMAS = (1e-9, 1e6)
+
+
+@dataclass(frozen=True)
+class BoxNoise:
+    """How far a box edge lies from the outline of an ellipsoid.
+
+    sigma = hypot(pixels, relative * side of the box across that edge): a detector's noise, and a
+    part that grows with the box because real objects, cubes among them, are no ellipsoids.
+    """
+
+    pixels: float = 2.0
+    """Sigma, pixels."""
+    relative: float = 0.05
+    """Sigma over side length of the box."""
+
+    def covariance(self, box: Floats) -> Floats:
+        """Return the covariance [px^2] of u_min, v_min, u_max, v_max, shape (b, 4, 4)."""
+        if not (np.isfinite([self.pixels, self.relative]).all() and self.pixels > 0.0):
+            raise ValueError(f"box noise: expected positive, finite pixels, got {self}")
+        if self.relative < 0.0:
+            raise ValueError(f"box noise: relative is negative: {self}")
+        side = np.tile(box[:, 2:] - box[:, :2], (1, 2))
+        variance = self.pixels**2 + (self.relative * side) ** 2
+        return np.asarray(variance[:, :, None] * np.eye(4))
+
+
+@dataclass(frozen=True)
+class OdometryNoise:
+    """Standard deviations of one step of odometry, each axis: meters and radians."""
+
+    translation_m: float = 0.01
+    rotation_rad: float = 0.005
+
+    def __post_init__(self) -> None:
+        """Refuse what is no standard deviation."""
+        for name, sigma in (("translation", self.translation_m), ("rotation", self.rotation_rad)):
+            if not SIGMAS[0] <= sigma <= SIGMAS[1]:
+                raise ValueError(
+                    f"odometry noise: {name} is {sigma:g}, not between "
+                    f"{SIGMAS[0]:g} and {SIGMAS[1]:g}"
+                )
+
+    def covariance(self, steps: int) -> Floats:
+        """Repeat the covariance of a step, translation first: shape (steps, 6, 6)."""
+        variance = np.repeat([self.translation_m**2, self.rotation_rad**2], 3)
+        return np.tile(np.diag(variance), (steps, 1, 1))

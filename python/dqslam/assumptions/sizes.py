@@ -1,0 +1,72 @@
+"""How large objects are before any is seen: one prior for all, or a table of one per class."""
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from dqslam.config import load_toml_model
+
+
+@dataclass(frozen=True)
+class SizePrior:
+    """A log-normal semi-axis, broad on purpose."""
+
+    log_mean: float = float(np.log(0.3))
+    """Log of the median semi-axis in meters."""
+    log_sigma: float = 0.7
+    """Sigma of the log."""
+
+
+@dataclass(frozen=True)
+class SizePriors:
+    """Size priors by the name of the class, and one for all other classes."""
+
+    classes: Mapping[str, SizePrior]
+    default: SizePrior = field(default_factory=SizePrior)
+
+    def of(self, class_name: str) -> SizePrior:
+        """Return the prior of a class."""
+        return self.classes.get(class_name, self.default)
+
+    def check_classes(self, known: Collection[str]) -> None:
+        """Raise a ValueError that names the first class which is not known, and those that are."""
+        for name in self.classes:
+            if name not in known:
+                names = ", ".join(sorted(known))
+                raise ValueError(f"size priors: no class {name!r} in the recording, only: {names}")
+
+
+class _Entry(BaseModel):
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+    median_m: Annotated[float, Field(gt=0.0)]
+    spread: Annotated[float, Field(gt=1.0)]
+
+    def prior(self) -> SizePrior:
+        return SizePrior(float(np.log(self.median_m)), float(np.log(self.spread)))
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+    default: _Entry | None = None
+    classes: dict[str, _Entry] = {}
+
+
+def load_size_priors(path: str | Path) -> SizePriors:
+    """Read a table of size priors from a TOML file.
+
+    It has a part ``[classes.NAME]`` for each class and may have one for all others, ``[default]``,
+    each with ``median_m``, the median semi-axis in meters, and ``spread``, a factor above 1: two
+    of three semi-axes are between median / spread and median * spread.
+
+    Raises
+    ------
+    FileError
+        When the file is missing, or no such table; names the line of every wrong setting.
+    """
+    table = load_toml_model(path, _Table)
+    classes = {name: entry.prior() for name, entry in table.classes.items()}
+    return SizePriors(classes, SizePrior() if table.default is None else table.default.prior())

@@ -1,0 +1,88 @@
+"""Errors of each pose against the truth, with the uncertainty that the estimate claims."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dqslam._checks import Floats
+from dqslam.evaluation.trajectory import common_poses
+from dqslam.io import Results, Trajectory
+from dqslam.metrics import Align, Alignment, align_positions
+
+
+@dataclass(frozen=True, eq=False)
+class PoseErrors:
+    """Errors at the times that estimate and truth have in common, along axes of the true world."""
+
+    timestamps: Floats
+    """Seconds, shape (k,)."""
+    distance: Floats
+    """Absolute trajectory error: distance after alignment as ``dqslam evaluate`` does, (k,) m."""
+    odometry_distance: Floats
+    """The same of the odometry, aligned by itself, shape (k,)."""
+    position: Floats
+    """Estimate - truth [m], the first pose being made equal, shape (k, 3)."""
+    position_sigma: Floats
+    """Standard deviation that the estimate claims [m], shape (k, 3); NaN where unknown."""
+    rotation: Floats
+    """Rotation vector from truth to estimate [rad], likewise, shape (k, 3)."""
+    rotation_sigma: Floats
+    """Its standard deviation [rad], shape (k, 3)."""
+
+
+def pose_errors(
+    results: Results,
+    groundtruth: Trajectory,
+    *,
+    align: Align = "se3",
+    max_time_difference: float | None = None,
+) -> PoseErrors:
+    """Compare the poses of an estimate with the true ones, one by one.
+
+    Distances are those that ``evaluate_results`` summarizes. Vectors are instead relative to the
+    first common pose, for so are the covariances; with ``align`` "none" worlds are taken as they
+    are.
+    """
+    from scipy.spatial.transform import Rotation
+
+    rows, true_rows = common_poses(results.timestamps, groundtruth, max_time_difference)
+    poses, true_poses = results.world_from_camera[rows], groundtruth.world_from_camera[true_rows]
+
+    def distance(positions: Floats) -> Floats:
+        moved = align_positions(positions, true_poses[:, :3], align).apply(positions)
+        return np.asarray(np.linalg.norm(moved - true_poses[:, :3], axis=1))
+
+    start = _same_start(poses, true_poses, align)
+    moved = start.apply_poses(poses)
+    turn = Rotation.from_quat(moved[:, 3:])
+    in_world = turn.as_matrix()
+    covariance = results.covariance[rows]
+    return PoseErrors(
+        timestamps=results.timestamps[rows],
+        distance=distance(poses[:, :3]),
+        odometry_distance=distance(results.odometry[rows, :3]),
+        position=moved[:, :3] - true_poses[:, :3],
+        position_sigma=start.scale * _sigmas(in_world, covariance[:, :3, :3]),
+        rotation=(turn * Rotation.from_quat(true_poses[:, 3:]).inv()).as_rotvec(),
+        rotation_sigma=_sigmas(in_world, covariance[:, 3:, 3:]),
+    )
+
+
+def _same_start(poses: Floats, true_poses: Floats, align: Align) -> Alignment:
+    """Return the motion that makes the first pose equal, with the scale of an alignment."""
+    from scipy.spatial.transform import Rotation
+
+    if align == "none":
+        return Alignment(np.eye(3), np.zeros(3))
+    scale = align_positions(poses[:, :3], true_poses[:, :3], align).scale
+    turn, true_turn = (Rotation.from_quat(given[0, 3:]) for given in (poses, true_poses))
+    rotation = (true_turn * turn.inv()).as_matrix()
+    return Alignment(rotation, true_poses[0, :3] - scale * rotation @ poses[0, :3], scale)
+
+
+def _sigmas(in_world: Floats, covariance: Floats) -> Floats:
+    """Return standard deviations along the axes of the world, (k, 3), of covariances (k, 3, 3)."""
+    variance = np.einsum("nij,njk,nik->ni", in_world, covariance, in_world)
+    return np.asarray(np.sqrt(variance.clip(min=0.0)))

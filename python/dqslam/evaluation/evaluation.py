@@ -1,0 +1,110 @@
+"""Put all judgments of a directory of results together."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import numpy as np
+
+from dqslam._checks import Floats
+from dqslam.evaluation.boxes import judge_association, judge_reprojection
+from dqslam.evaluation.objects import Match, judge_objects
+from dqslam.evaluation.trajectory import common_poses, judge_trajectory
+from dqslam.io import Results, Trajectory, TrueBoxes, TrueObjects
+from dqslam.metrics import Align, Alignment, align_poses, align_positions
+
+# Where orientations differ by more, radians, they are not of the same thing.
+LARGEST_TURN = np.radians(20.0)
+
+
+def evaluate_results(
+    results: Results,
+    groundtruth: Trajectory,
+    *,
+    align: Align = "se3",
+    rpe_delta: float = 1.0,
+    rpe_unit: Literal["frames", "meters"] = "frames",
+    objects: TrueObjects | None = None,
+    match: Match = "nearest",
+    gate: float | None = None,
+    boxes: TrueBoxes | None = None,
+    max_time_difference: float | None = None,
+) -> dict[str, Any]:
+    """Return what ``evaluation.json`` holds: docs/evaluation.md has every key and unit.
+
+    Parameters
+    ----------
+    groundtruth
+        The true trajectory, in any world.
+    align
+        The kind of motion between both worlds that is removed. Trajectories are aligned by their
+        positions, each by its own motion; objects by the whole poses of the estimate, see
+        ``object_alignment``.
+    rpe_delta, rpe_unit
+        Over what the relative pose error is taken, see ``relative_pose_error``.
+    objects, match, gate
+        The true objects and how to match them, see ``judge_objects``.
+    boxes
+        Boxes of known objects: the association is judged by them.
+    max_time_difference
+        Seconds between times that count as the same, by default half the interval of poses.
+    """
+    from scipy.spatial.transform import Rotation
+
+    rows, true_rows = common_poses(results.timestamps, groundtruth, max_time_difference)
+    true_poses = groundtruth.world_from_camera[true_rows]
+
+    def judged(poses: Floats) -> tuple[dict[str, Any], dict[str, Any]]:
+        return judge_trajectory(
+            poses[rows], true_poses, align=align, rpe_delta=rpe_delta, rpe_unit=rpe_unit
+        )
+
+    ate, rpe = judged(results.world_from_camera)
+    odometry_ate, odometry_rpe = judged(results.odometry)
+    alignment, by = object_alignment(results, results.world_from_camera[rows], true_poses, align)
+    object_errors, association = None, None
+    if objects is not None:
+        object_errors = judge_objects(results.objects, objects, alignment, match=match, gate=gate)
+    if boxes is not None:
+        association = judge_association(results, boxes, max_time_difference=max_time_difference)
+    return {
+        "align": align,
+        "poses": len(rows),
+        "ate": ate,
+        "odometry_ate": odometry_ate,
+        "rpe": rpe,
+        "odometry_rpe": odometry_rpe,
+        "true_from_estimated": {
+            "by": by,
+            "rotation_xyzw": Rotation.from_matrix(alignment.rotation).as_quat(),
+            "translation": alignment.translation,
+            "scale": alignment.scale,
+        },
+        "objects": object_errors,
+        "reprojection_iou": judge_reprojection(results),
+        "association": association,
+    }
+
+
+def object_alignment(
+    results: Results, poses: Floats, true_poses: Floats, align: Align
+) -> tuple[Alignment, Literal["poses", "positions"]]:
+    """Return the motion that brings the map into the world of the truth, and what it is found by.
+
+    It fits whole poses, (n, 7), with points as far ahead of them as objects are: the median of the
+    objects' least distances from the path. Positions alone leave the turn about a straight path
+    free. They have to do where the poses do not agree, as with the pose of a body that looks
+    elsewhere than the camera.
+    """
+    from scipy.spatial.transform import Rotation
+
+    path = results.world_from_camera[:, :3]
+    nearest = [np.linalg.norm(path - center, axis=1).min() for center in results.objects.center]
+    lever = float(np.median(nearest)) if nearest else 0.0
+    found = align_poses(poses, true_poses, align, lever=lever if lever > 0.0 else 1.0)
+    turns, true_turns = (
+        Rotation.from_quat(given[:, 3:]) for given in (found.apply_poses(poses), true_poses)
+    )
+    if align == "none" or np.median((true_turns.inv() * turns).magnitude()) < LARGEST_TURN:
+        return found, "poses"
+    return align_positions(poses[:, :3], true_poses[:, :3], align), "positions"

@@ -1,0 +1,210 @@
+"""From a recording to the plain arrays the core solves, and back to an estimate."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dqslam import _core
+from dqslam._checks import Bools, Floats, Ints, as_floats, reject_rows
+from dqslam.assumptions import BoxNoise, SizePrior, SizePriors
+from dqslam.estimate import Estimate
+from dqslam.recording import Detections, Recording, RelativePositions
+
+# Two boxes do not tell an object's distance from its size.
+FEWEST_INLIER_VIEWS = 3
+# A few boxes fit some ellipsoid even if all of them are wrong: so many must, or that share of all
+# if that is fewer. Of a moved object, a small share of many boxes may fit at one of its places.
+ENOUGH_INLIERS = 6
+ENOUGH_INLIER_SHARE = 1.0 / 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class Graph:
+    """The problem as arrays for the core, and what its rows are called."""
+
+    core: _core.Graph
+    timestamps: Floats
+    """Seconds, shape (n,)."""
+    object_ids: Ints
+    """Id of each object row, ascending, shape (o,)."""
+    class_names: tuple[str, ...]
+    """One per object: the class most of its boxes have."""
+    observations: Ints
+    """Boxes per object, shape (o,)."""
+
+
+def build_graph(
+    recording: Recording,
+    *,
+    box_noise: BoxNoise | None = None,
+    size_prior: SizePrior | SizePriors | None = None,
+    scene_priors: _core.ScenePriors | None = None,
+) -> Graph:
+    """Lay out a recording as a least-squares problem that starts from dead reckoning.
+
+    Parameters
+    ----------
+    box_noise, size_prior
+        What is assumed of boxes and objects; a table of size priors has one per class.
+    scene_priors
+        What is known of the scene, by default nothing: that objects are upright, or stand on the
+        ground, or how high the camera is.
+
+    Raises
+    ------
+    ValueError
+        When there are no boxes, one has no object id, a relative position belongs to an object
+        without boxes, a size prior to a class without boxes, or the core refuses the problem.
+    """
+    box_noise = BoxNoise() if box_noise is None else box_noise
+    odometry, detections = recording.odometry, recording.detections
+    object_ids, box_object, observations = _objects(detections)
+    class_names = _class_names(detections, box_object, len(object_ids))
+    priors = _size_priors(size_prior, class_names, detections)
+    steps = np.arange(len(odometry.relative))
+    core = _core.Graph(
+        odometry.pose_model,
+        recording.camera,
+        initial_poses=_core.dead_reckon(
+            odometry.pose_model, odometry.first_pose, odometry.relative
+        ),
+        odometry_from=steps,
+        odometry_to=steps + 1,
+        odometry=odometry.relative,
+        odometry_covariance=_flat(odometry.covariance),
+        box_pose=detections.pose,
+        box_object=box_object,
+        boxes=detections.box,
+        box_covariance=_flat(box_noise.covariance(detections.box)),
+        box_truncated=detections.truncated,
+        log_size_mean=np.array([prior.log_mean for prior in priors]),
+        log_size_sigma=np.array([prior.log_sigma for prior in priors]),
+        scene_priors=_core.ScenePriors() if scene_priors is None else scene_priors,
+        **_position_arrays(recording.positions, object_ids),
+    )
+    return Graph(
+        core=core,
+        timestamps=recording.timestamps,
+        object_ids=object_ids,
+        class_names=class_names,
+        observations=observations,
+    )
+
+
+def solve(
+    graph: Graph,
+    options: _core.SolveOptions | None = None,
+    *,
+    start: _core.State | None = None,
+) -> tuple[Estimate, _core.Summary]:
+    """Estimate poses and objects, from odometry or a given start; options default to the core's.
+
+    Objects that the landmark model left as no ellipsoid have NaN in `Estimate.ellipsoids`. With a
+    robust loss, objects that too few boxes fit are not in the estimate but in `Estimate.dropped`.
+    """
+    options = _core.SolveOptions() if options is None else options
+    solution = _core.solve(graph.core, options, start)
+    initial_poses = graph.core.initial_poses
+    dual_quadrics = as_floats("solution.dual_quadrics", solution.dual_quadrics, [None, 9])
+    if options.landmark_model == _core.LandmarkModel.ELLIPSOID:
+        ellipsoids = as_floats("solution.landmarks", solution.landmarks, [None, 9])
+    else:
+        ellipsoids = np.array([_ellipsoid_or_nan(q) for q in dual_quadrics]).reshape(-1, 9)
+    unfit = _unfit(graph, solution.inliers) if options.loss != _core.Loss.NONE else {}
+    kept = ~np.isin(graph.object_ids, list(unfit))
+    estimate = Estimate(
+        pose_model=graph.core.pose_model,
+        camera=graph.core.camera,
+        timestamps=graph.timestamps,
+        poses=as_floats("solution.poses", solution.poses, initial_poses.shape),
+        initial_poses=initial_poses,
+        object_ids=graph.object_ids[kept],
+        class_names=tuple(np.array(graph.class_names)[kept].tolist()),
+        observations=graph.observations[kept],
+        dual_quadrics=dual_quadrics[kept],
+        ellipsoids=ellipsoids[kept],
+        inliers=solution.inliers,
+        dropped=unfit,
+    )
+    return estimate, solution.summary
+
+
+def _unfit(graph: Graph, inliers: Bools) -> dict[int, str]:
+    """Say by id which objects too few boxes fit, and how few."""
+    views = _inlier_views(graph.core, inliers)
+    fit = np.bincount(graph.core.box_object[inliers], minlength=len(views))
+    needed = np.ceil(np.minimum(ENOUGH_INLIERS, ENOUGH_INLIER_SHARE * graph.observations))
+    reasons = {}
+    for row, object_id in enumerate(graph.object_ids.tolist()):
+        if views[row] < FEWEST_INLIER_VIEWS:
+            reasons[object_id] = (
+                f"seen in {views[row]} poses by boxes that fit, {FEWEST_INLIER_VIEWS} are needed"
+            )
+        elif fit[row] < needed[row]:
+            reasons[object_id] = (
+                f"{fit[row]} of {graph.observations[row]} boxes fit, {needed[row]:.0f} are needed"
+            )
+    return reasons
+
+
+def _inlier_views(core: _core.Graph, inliers: Bools) -> Ints:
+    """Return from how many poses boxes that fit show each object, shape (o,)."""
+    pairs = np.column_stack([core.box_object, core.box_pose])[inliers]
+    seen = np.unique(pairs, axis=0)
+    return np.bincount(seen[:, 0], minlength=core.num_objects)
+
+
+def _size_priors(
+    given: SizePrior | SizePriors | None, class_names: tuple[str, ...], detections: Detections
+) -> list[SizePrior]:
+    """Return the prior of each object, by the names of their classes (o,)."""
+    if isinstance(given, SizePriors):
+        given.check_classes(set(detections.class_names.values()))
+        return [given.of(name) for name in class_names]
+    return [SizePrior() if given is None else given] * len(class_names)
+
+
+def _objects(detections: Detections) -> tuple[Ints, Ints, Ints]:
+    """Return the object ids (o,), the row of each box's object (b,), and boxes per object (o,)."""
+    if not len(detections):
+        raise ValueError("detections: there are no boxes")
+    unknown = detections.object_id < 0
+    reject_rows("detections.object_id", unknown, "the box belongs to no object yet")
+    object_ids, box_object, observations = np.unique(
+        detections.object_id, return_inverse=True, return_counts=True
+    )
+    return object_ids, box_object.reshape(-1), observations
+
+
+def _class_names(detections: Detections, box_object: Ints, objects: int) -> tuple[str, ...]:
+    classes, box_class = np.unique(detections.class_id, return_inverse=True)
+    votes = np.zeros((objects, len(classes)), dtype=np.int64)
+    np.add.at(votes, (box_object, box_class.reshape(-1)), 1)
+    return tuple(detections.class_names[int(classes[row])] for row in votes.argmax(axis=1))
+
+
+def _position_arrays(
+    positions: RelativePositions | None, object_ids: Ints
+) -> dict[str, Floats | Ints]:
+    if positions is None or not len(positions):
+        return {}
+    has_no_box = ~np.isin(positions.object_id, object_ids)
+    reject_rows("positions.object_id", has_no_box, "the object has no box", positions.object_id)
+    return {
+        "position_pose": positions.pose,
+        "position_object": np.searchsorted(object_ids, positions.object_id),
+        "positions": positions.object_in_robot,
+        "position_covariance": _flat(positions.covariance),
+    }
+
+
+def _flat(covariance: Floats) -> Floats:
+    """Lay out matrices (m, k, k) as rows (m, k * k)."""
+    return covariance.reshape(len(covariance), covariance.shape[1] ** 2)
+
+
+def _ellipsoid_or_nan(dual_quadric: Floats) -> Floats:
+    try:
+        return _core.ellipsoid_from_dual_quadric(dual_quadric)
+    except ValueError:
+        return np.full(9, np.nan)

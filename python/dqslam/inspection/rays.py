@@ -1,0 +1,84 @@
+"""Whether the rays through the middles of an object's boxes meet in a point.
+
+They do, but for the size of the object and the noise of its boxes, where poses, camera and boxes
+fit together: the median distance of the middles from the projection of the best point is then some
+pixels.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dqslam import _core
+
+ITERATIONS = 5
+# Middles further off than this lose their weight: false boxes, objects that moved [px].
+DOUBT_PX = 10.0
+# Root mean square angle that the rays of a track must span across, for a point to be told [rad].
+LEAST_PARALLAX = 0.02
+NEAREST_M = 1e-6
+BEHIND_PX = 1e4  #: what a point behind the camera is off
+
+
+@dataclass(frozen=True)
+class Views:
+    """Where the boxes of t tracks were seen from, at most n times each."""
+
+    world_from_camera: NDArray[np.float64]  #: (t, n, 7)
+    middle: NDArray[np.float64]  #: (t, n, 2) px, as recorded
+    there: NDArray[np.bool_]  #: (t, n); the rest of a shorter track repeats its last view
+
+
+def inverted(poses: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the poses (..., 7) read as camera_from_world."""
+    from scipy.spatial.transform import Rotation
+
+    flat = poses.reshape(-1, 7)
+    turn = Rotation.from_quat(flat[:, 3:]).inv()
+    return np.hstack([-turn.apply(flat[:, :3]), turn.as_quat()]).reshape(poses.shape)
+
+
+def residuals(camera: _core.Camera, views: Views) -> NDArray[np.float64]:
+    """Return how far each middle is from the point of its track [px], shape (t, n).
+
+    It is nan where a track is shorter, or its rays have no parallax.
+    """
+    from scipy.spatial.transform import Rotation
+
+    shape = views.there.shape
+    focal = np.array([camera.fx, camera.fy])
+    ideal = camera.undistort_points(views.middle.reshape(-1, 2)).reshape(*shape, 2)
+    normalized = (ideal - [camera.cx, camera.cy]) / focal
+    poses = views.world_from_camera
+    turn = Rotation.from_quat(poses[..., 3:].reshape(-1, 4)).as_matrix().reshape(*shape, 3, 3)
+    ray = np.einsum("tnij,tnj->tni", turn, np.dstack([normalized, np.ones(shape)]))
+    ray /= np.linalg.norm(ray, axis=2, keepdims=True)
+    across = np.eye(3) - ray[..., :, None] * ray[..., None, :]
+    # The least eigenvalue is the mean square angle to the direction that the rays share.
+    mean = np.einsum("tn,tnij->tij", views.there, across) / views.there.sum(axis=1)[:, None, None]
+    spread = np.linalg.eigvalsh(mean)[:, 0]
+    flat = spread < LEAST_PARALLAX**2
+    across[flat] = np.eye(3)  # any point, to be thrown away
+    origin = poses[:, :1, :3]
+    position = poses[..., :3] - origin
+    weight = views.there.astype(float)
+    off = np.zeros(shape)
+    for _ in range(ITERATIONS):
+        # The point nearest to all rays, each weighed by its doubt and by 1 / depth.
+        normal = np.einsum("tn,tnij->tij", weight, across)
+        target = np.einsum("tn,tnij,tnj->ti", weight, across, position)
+        point = np.linalg.solve(normal, target[..., None])[..., 0]
+        local = np.einsum("tnji,tnj->tni", turn, point[:, None] - position)
+        ahead = local[..., 2] > NEAREST_M
+        depth = np.where(ahead, local[..., 2], 1.0)
+        error = (local[..., :2] / depth[..., None] - normalized) * focal
+        off = np.where(ahead, np.linalg.norm(error, axis=2), BEHIND_PX)
+        weight = views.there / (1 + (off / DOUBT_PX) ** 2) / depth**2
+        weight /= weight.max(axis=1, keepdims=True)
+    off = np.minimum(off, BEHIND_PX)
+    off[~views.there] = np.nan
+    off[flat] = np.nan
+    return off

@@ -1,0 +1,36 @@
+"""Whether boxes and poses share a clock."""
+
+from __future__ import annotations
+
+from dqslam.inspection.evidence import Evidence, Finding, Floats
+
+# What a clock may count instead of seconds.
+UNITS = {"milliseconds": 1e-3, "microseconds": 1e-6, "nanoseconds": 1e-9}
+# Of the longer span: what is common where the units differ, and where they are put right.
+APART, TOGETHER = 0.01, 0.5
+
+
+def check_times(evidence: Evidence) -> Finding | None:
+    """Compare the spans of poses and boxes, in seconds and with one of them in other units."""
+    poses, boxes = evidence.trajectory.timestamps, evidence.table.timestamp
+    span = f"boxes {_span(boxes)}, poses {_span(poses)}"
+    if _common(poses, boxes) <= APART:
+        for unit, seconds in UNITS.items():
+            if _common(poses, boxes * seconds) >= TOGETHER:
+                return Finding("times", f"times of the boxes look like {unit}: {span}")
+            if _common(poses * seconds, boxes) >= TOGETHER:
+                return Finding("times", f"times of the poses look like {unit}: {span}")
+    if evidence.timely.any():
+        return None
+    return Finding("times", f"no box has a pose within {evidence.tolerance:g} s of it: {span}")
+
+
+def _common(poses: Floats, boxes: Floats) -> float:
+    """Return the part of the longer span that both have."""
+    common = min(poses.max(), boxes.max()) - max(poses.min(), boxes.min())
+    longer = max(float(poses.max() - poses.min()), float(boxes.max() - boxes.min()))
+    return max(0.0, float(common)) / longer
+
+
+def _span(times: Floats) -> str:
+    return f"{times.min():.6f} to {times.max():.6f} s"

@@ -1,0 +1,132 @@
+"""Scores beside plain errors: against the posterior bound, and of wrong associations."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from dqslam import _core
+from dqslam._checks import Bools
+from dqslam._core import SolveOptions, Summary
+from dqslam.estimate import Estimate
+from dqslam.graph import Graph, solve
+from dqslam.metrics import mean_distance, position_error, true_rows
+from dqslam.recording import Recording, Truth
+from dqslam.studies.paper.methods import Beliefs
+from dqslam.uncertainty import (
+    chi_square_interval,
+    marginal_covariances,
+    normalized_squares,
+    posterior_bound,
+    true_state,
+)
+
+# Half a chi-square of 0.1: estimates that differ by less are the same.
+SAME_COST = 0.05
+
+
+@dataclass(frozen=True)
+class BoundScore:
+    """An estimate beside what the data could give at best."""
+
+    bound: float
+    """Expected mean position error, meters."""
+    last_pose_nees: float
+    """Squared error of the last pose in sigmas of its own covariance, by degrees of freedom."""
+    pose_nees: float
+    """The same, mean over all poses but the first, which is fixed."""
+    pose_dof: int
+    center_nees: float
+    """The same, mean over the centers of the mapped objects; 3 degrees of freedom."""
+    is_optimum: bool
+    """Whether a start at the truth ends no lower."""
+
+
+@dataclass(frozen=True)
+class RobustScore:
+    """How wrong ids were told from right ones, and what it would be worth to know them."""
+
+    precision: float
+    """Share of the boxes called inliers whose id is right."""
+    recall: float
+    """Share of the boxes with the right id that are called inliers."""
+    oracle_rmse_pos: float
+    """Mean position error of the run that is told the right ones, meters."""
+    oracle_rmse_landmark: float
+    """Mean error of its centers, of the objects that the estimate has too, meters."""
+    dropped: int
+    """Objects that the estimate leaves out because too few boxes fit them."""
+
+
+def score_bound(
+    graph: Graph,
+    right_graph: Graph,
+    truth: Truth,
+    solved: tuple[Estimate, Summary],
+    options: SolveOptions,
+) -> BoundScore:
+    """Compare an estimate with the bound, its own covariance, and the optimum.
+
+    `right_graph` is the problem without the boxes whose id is wrong.
+    """
+    estimate, summary = solved
+    covariance = marginal_covariances(graph, estimate, options)
+    pose_error = _core.minus(truth.pose_model, truth.poses, estimate.poses)[1:]
+    pose_nees = normalized_squares(pose_error, covariance.poses[1:])
+    rows = true_rows(estimate.object_ids, truth)
+    center_nees = normalized_squares(truth.center[rows] - estimate.centers, covariance.centers)
+    _, from_truth = solve(graph, options, start=true_state(graph, truth, options))
+    return BoundScore(
+        bound=posterior_bound(right_graph, truth).position_error,
+        last_pose_nees=float(pose_nees[-1]),
+        pose_nees=float(pose_nees.mean()),
+        pose_dof=pose_error.shape[1],
+        center_nees=float(np.nanmean(center_nees)),  # NaN: nothing determines the object
+        is_optimum=bool(summary.final_cost <= from_truth.final_cost + SAME_COST),
+    )
+
+
+def score_robust(
+    right_graph: Graph, right: Bools, truth: Truth, estimate: Estimate, options: SolveOptions
+) -> RobustScore:
+    """Score which boxes fit, against which have the right id (b,); options: of the told run."""
+    found = estimate.inliers & right
+    told, _ = solve(right_graph, options)
+    shared = told.object_ids[np.isin(told.object_ids, estimate.object_ids)]
+    told_centers = told.centers[np.isin(told.object_ids, shared)]
+    return RobustScore(
+        precision=float(found.sum() / max(estimate.inliers.sum(), 1)),
+        recall=float(found.sum() / max(right.sum(), 1)),
+        oracle_rmse_pos=position_error(truth.pose_model, told.poses, truth.poses),
+        oracle_rmse_landmark=mean_distance(told_centers, truth.center[true_rows(shared, truth)]),
+        dropped=len(estimate.dropped),
+    )
+
+
+def right_graph_of(recording: Recording, right: Bools, believed: Beliefs) -> Graph:
+    """Return the problem of the boxes that have the right id (b,)."""
+    detections = recording.detections.select(right)
+    positions = recording.positions
+    if positions is not None:
+        positions = positions.select(np.isin(positions.object_id, detections.object_id))
+    return believed.graph(replace(recording, detections=detections, positions=positions))
+
+
+def summarize_bound(scores: Sequence[BoundScore], rmse_pos: Sequence[float]) -> dict[str, Any]:
+    """Average over trials; of an honest NEES the mean is 1, and in its interval in 95 % of cases.
+
+    The interval is that of one pose, or one object, a trial. A mean over all of them scatters less,
+    by how much depends on how they are correlated.
+    """
+    if not scores:
+        return {}
+    return {
+        "efficiency": float(np.mean(rmse_pos) / np.mean([score.bound for score in scores])),
+        "anees": float(np.mean([score.last_pose_nees for score in scores])),
+        "anees_poses": float(np.mean([score.pose_nees for score in scores])),
+        "anees_interval": chi_square_interval(sum(score.pose_dof for score in scores)),
+        "anees_objects": float(np.mean([score.center_nees for score in scores])),
+        "anees_objects_interval": chi_square_interval(3 * len(scores)),
+        "optimum_rate": float(np.mean([score.is_optimum for score in scores])),
+    }

@@ -1,0 +1,201 @@
+"""The paper's table 1: errors of many trials, as numbers and as JSON."""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+
+from dqslam.io.files import write_json
+from dqslam.simulation.scenario import Scenario
+from dqslam.studies.paper.methods import ROWS, Method, RowName, Settings, candidate_sigmas
+from dqslam.studies.paper.scores import summarize_bound
+from dqslam.studies.paper.trial import Outcome, Trial
+
+METRICS = ("rmse_pos", "rmse_landmark", "rmse_volume")
+
+# [S&M17] table 1, (avg, med) of each metric.
+PAPER_ODOMETRY = (5.31, 4.03)
+PAPER_ROWS: dict[RowName, dict[str, tuple[float, float]]] = {
+    "monocular": {
+        "rmse_pos": (4.12, 3.33),
+        "rmse_landmark": (4.27, 2.86),
+        "rmse_volume": (0.36, 0.12),
+    },
+    "relative_position": {
+        "rmse_pos": (1.75, 0.63),
+        "rmse_landmark": (2.39, 0.89),
+        "rmse_volume": (7.28, 0.13),
+    },
+}
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """Of one metric over the trials that succeeded; NaN when none did."""
+
+    avg: float
+    med: float
+    max: float
+
+    @classmethod
+    def of(cls, values: Sequence[float]) -> Self:
+        """Summarize values."""
+        if not len(values):
+            return cls(np.nan, np.nan, np.nan)
+        return cls(float(np.mean(values)), float(np.median(values)), float(np.max(values)))
+
+
+@dataclass(frozen=True)
+class TableRow:
+    """One row of the table: all trials of one kind, with one candidate sigma."""
+
+    algebraic_sigma: float | None
+    metrics: dict[str, Statistics]
+    """By the names in METRICS; meters, meters, cubic meters."""
+    volume_relative_error: Statistics
+    """Of our own estimate of volume, over the objects of all trials."""
+    seconds_med: float
+    failures: dict[int, str]
+    """Why a trial failed, by its seed."""
+    worse_than_odometry: tuple[int, ...] = ()
+    """Seeds of the trials whose positions are further off than those of odometry alone."""
+    scores: dict[str, Any] = field(default_factory=dict)
+    """What the bound and wrong ids add, by name; of the trials that succeeded."""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Lay out the row as plain data."""
+        volume = self.volume_relative_error
+        return {
+            **{metric: asdict(self.metrics[metric]) for metric in METRICS},
+            "volume_relative_error": {"avg": volume.avg, "med": volume.med},
+            **self.scores,
+            "failures": len(self.failures),
+            "worse_than_odometry": list(self.worse_than_odometry),
+            "seconds_per_trial": {"med": self.seconds_med},
+        }
+
+
+@dataclass(frozen=True)
+class PaperTable:
+    """The paper's table 1 for one method, and the scan it was chosen from."""
+
+    seeds: tuple[int, ...]
+    scenario: Scenario
+    settings: Settings
+    odometry: Statistics
+    """RMSE_pos of odometry alone, meters."""
+    scan: dict[RowName, tuple[TableRow, ...]]
+    """One table row per candidate sigma."""
+
+    @property
+    def method(self) -> Method:
+        """Return the name of the estimator."""
+        return self.settings.method
+
+    def best(self, row: RowName) -> TableRow:
+        """Return the row with the fewest failures, among these the least mean RMSE_pos."""
+        return min(
+            self.scan[row],
+            key=lambda one: (
+                len(one.failures),
+                np.nan_to_num(one.metrics["rmse_pos"].avg, nan=np.inf),
+            ),
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """Lay out the table as plain data, for JSON; the scan is there when there is a choice."""
+        table: dict[str, Any] = {
+            "trials": len(self.seeds),
+            "seed": self.seeds[0],
+            "scenario": self.scenario.name,
+            "objects": self.scenario.objects,
+            "method": self.method,
+            "loss": self.settings.loss,
+            "odometry": {"rmse_pos": asdict(self.odometry)},
+        }
+        detector = self.scenario.detector
+        if detector.wrong_associations > 0.0:
+            table["wrong_associations"] = detector.wrong_associations
+            table["wrong_association_kind"] = detector.wrong_association_kind
+        for name in ROWS:
+            table[name] = self.best(name).as_dict()
+        if self.method == "paper":
+            table["scan"] = {name: [_scan_entry(row) for row in self.scan[name]] for name in ROWS}
+        return table
+
+    def save(self, path: str | Path) -> None:
+        """Write the table as JSON, whole or not at all."""
+        write_json(path, self.as_dict())
+
+
+def _scan_entry(row: TableRow) -> dict[str, Any]:
+    return {
+        "algebraic_sigma": row.algebraic_sigma,
+        "rmse_pos": asdict(row.metrics["rmse_pos"]),
+        "failures": len(row.failures),
+    }
+
+
+def tabulate(trials: Sequence[Trial], scenario: Scenario, settings: Settings) -> PaperTable:
+    """Put the outcomes of trials into a table."""
+    sigmas = candidate_sigmas(settings.method)
+    return PaperTable(
+        seeds=tuple(trial.seed for trial in trials),
+        scenario=scenario,
+        settings=settings,
+        odometry=Statistics.of([trial.odometry_rmse_pos for trial in trials]),
+        scan={
+            row: tuple(
+                _table_row(sigma, {trial.seed: trial.outcomes[row][column] for trial in trials})
+                for column, sigma in enumerate(sigmas)
+            )
+            for row in ROWS
+        },
+    )
+
+
+def _table_row(sigma: float | None, outcomes: dict[int, Outcome]) -> TableRow:
+    reports = [outcome.report for outcome in outcomes.values() if outcome.report is not None]
+    return TableRow(
+        algebraic_sigma=sigma,
+        metrics={
+            metric: Statistics.of([getattr(report, metric) for report in reports])
+            for metric in METRICS
+        },
+        volume_relative_error=Statistics.of(
+            [error for report in reports for error in report.volume_relative_errors]
+        ),
+        seconds_med=float(np.median([outcome.seconds for outcome in outcomes.values()])),
+        failures={
+            seed: outcome.failure for seed, outcome in outcomes.items() if outcome.report is None
+        },
+        worse_than_odometry=tuple(
+            seed
+            for seed, outcome in outcomes.items()
+            if outcome.report is not None
+            and outcome.report.rmse_pos > outcome.report.odometry_rmse_pos
+        ),
+        scores=_scores(list(outcomes.values())),
+    )
+
+
+def _scores(outcomes: Sequence[Outcome]) -> dict[str, Any]:
+    """Average the scores of a row; those that no trial has are left out."""
+    bounds = [outcome.bound for outcome in outcomes if outcome.bound is not None]
+    errors = [
+        outcome.report.rmse_pos
+        for outcome in outcomes
+        if outcome.bound is not None and outcome.report is not None
+    ]
+    scores = summarize_bound(bounds, errors)
+    robust = [outcome.robust for outcome in outcomes if outcome.robust is not None]
+    if robust:
+        scores["inlier_precision"] = float(np.mean([score.precision for score in robust]))
+        scores["inlier_recall"] = float(np.mean([score.recall for score in robust]))
+        for name in ("oracle_rmse_pos", "oracle_rmse_landmark"):
+            told = Statistics.of([getattr(score, name) for score in robust])
+            scores[name] = asdict(told)
+        scores["objects_dropped"] = float(np.mean([score.dropped for score in robust]))
+    return scores

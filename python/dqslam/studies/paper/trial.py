@@ -1,0 +1,127 @@
+"""One trial: simulate a seed, estimate, and score."""
+
+import time
+from dataclasses import dataclass
+
+from dqslam import _core
+from dqslam._core import SolveOptions
+from dqslam.graph import solve
+from dqslam.metrics import Report, evaluate, position_error
+from dqslam.recording import Recording, Truth
+from dqslam.simulation.scenario import Scenario
+from dqslam.simulation.simulator import simulate
+from dqslam.studies.paper.methods import (
+    ROWS,
+    Beliefs,
+    RowName,
+    Settings,
+    beliefs,
+    candidate_sigmas,
+    method_options,
+    seen_by,
+)
+from dqslam.studies.paper.scores import (
+    BoundScore,
+    RobustScore,
+    right_graph_of,
+    score_bound,
+    score_robust,
+)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One solve of one trial: a report, or why there is none."""
+
+    report: Report | None
+    seconds: float
+    """Wall clock of building and solving the problem."""
+    failure: str = ""
+    bound: BoundScore | None = None
+    robust: RobustScore | None = None
+    """Where some ids are wrong."""
+    iterations: int = 0
+    """Of all stages of the solver."""
+    converged: bool = False
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One seed: the error of odometry, and one outcome per row and candidate sigma."""
+
+    seed: int
+    odometry_rmse_pos: float
+    """Meters."""
+    outcomes: dict[RowName, tuple[Outcome, ...]]
+
+
+def run_trial(scenario: Scenario, seed: int, settings: Settings) -> Trial:
+    """Simulate one seed and solve each row with each sigma; a solve may fail, and is kept."""
+    recording, truth = simulate(scenario, seed=seed)
+    odometry = recording.odometry
+    poses = _core.dead_reckon(odometry.pose_model, odometry.first_pose, odometry.relative)
+    believed = beliefs(scenario, settings)
+    return Trial(
+        seed=seed,
+        odometry_rmse_pos=position_error(truth.pose_model, poses, truth.poses),
+        outcomes={
+            row: tuple(
+                solve_and_score(
+                    seen_by(row, recording),
+                    truth,
+                    believed,
+                    method_options(settings, sigma),
+                    told=method_options(Settings(settings.method), sigma),
+                    bound=settings.bound,
+                )
+                for sigma in candidate_sigmas(settings.method)
+            )
+            for row in ROWS
+        },
+    )
+
+
+def solve_and_score(
+    recording: Recording,
+    truth: Truth,
+    believed: Beliefs,
+    options: SolveOptions,
+    *,
+    told: SolveOptions,
+    bound: bool,
+) -> Outcome:
+    """Solve what an estimator is given and compare it with the truth.
+
+    Parameters
+    ----------
+    told
+        Options of the run that is told which ids are right, without a loss; where some are wrong.
+    bound
+        Whether to compare with the posterior bound and the optimum too.
+    """
+    start = time.perf_counter()
+    seconds = None
+    try:
+        graph = believed.graph(recording)
+        solved = solve(graph, options)
+        seconds = time.perf_counter() - start
+        report = evaluate(solved[0], truth)
+        right = recording.detections.object_id == truth.box_object_id
+        right_graph = graph if right.all() else right_graph_of(recording, right, believed)
+        score = robust = None
+        if bound:
+            score = score_bound(graph, right_graph, truth, solved, options)
+        if not right.all():
+            robust = score_robust(right_graph, right, truth, solved[0], told)
+        summary = solved[1]
+        return Outcome(
+            report,
+            seconds,
+            bound=score,
+            robust=robust,
+            iterations=summary.iterations,
+            converged=summary.converged,
+        )
+    except Exception as error:  # whatever it was: counted, shown and never dropped
+        seconds = time.perf_counter() - start if seconds is None else seconds
+        return Outcome(None, seconds, f"{type(error).__name__}: {error}")

@@ -1,0 +1,181 @@
+"""The file of a sweep: which settings are varied, and the cells that come of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import Field
+
+from dqslam._files import FileError, FileErrors
+from dqslam.config import TomlFile, check_model, read_toml, right_keys, unknown_keys
+from dqslam.simulation.scenario import Scenario, load_scenario
+from dqslam.studies.sweep.settings import TrialSettings
+from dqslam.studies.sweep.varied import (
+    CellFile,
+    FileModel,
+    Location,
+    Value,
+    combinations,
+    leaves,
+    read_grid,
+    read_random,
+    refuse_twice,
+)
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One combination of values: what differs from other cells, and all the settings."""
+
+    values: Mapping[str, Any]
+    """Of each varied setting, by its dotted name."""
+    settings: TrialSettings
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """Cells, each to be run with the same seeds."""
+
+    scenario: str
+    """Name of the scenario that all cells are variations of."""
+    cells: tuple[Cell, ...]
+    seeds: tuple[int, ...]
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Return the dotted names of the settings that are varied."""
+        return tuple(self.cells[0].values)
+
+
+class _File(FileModel):
+    """What a file may say at its top; its tables are checked setting by setting."""
+
+    scenario: str
+    trials: Annotated[int, Field(ge=1)] = 50
+    """Seeds of each cell."""
+    seed: Annotated[int, Field(ge=0)] = 0
+    """The first of them."""
+    bound: bool = False
+    samples: Annotated[int, Field(ge=1)] = 1
+    """Random samples, each crossed with the whole grid."""
+    sample_seed: Annotated[int, Field(ge=0)] = 0
+    fixed: dict[str, Any] = {}
+    grid: dict[str, Any] = {}
+    random: dict[str, Any] = {}
+
+
+def load_sweep(path: str | Path) -> Sweep:
+    """Read the file of a sweep.
+
+    Raises
+    ------
+    FileError
+        When the file, or the scenario that it names, is missing or is none; with every wrong
+        setting and value, and the line of each.
+    """
+    file = read_toml(path)
+    mistakes: list[FileError] = []
+    said = _top(file, mistakes)
+    scenario = _scenario(file, said, mistakes)
+    fixed = {
+        name: [Value(location, value)] for name, location, value in leaves(("fixed",), said.fixed)
+    }
+    grid = read_grid(file, said.grid, mistakes)
+    random = read_random(file, said.random, mistakes, samples=said.samples, seed=said.sample_seed)
+    refuse_twice(file, (fixed, grid, random), mistakes)
+    _refuse_unknown(file, scenario, said, mistakes)
+    cells = []
+    for values, places in combinations(said.samples, fixed, grid, random):
+        try:
+            content, as_cell = _cell(file, said, scenario, values, places)
+            settings = check_model(TrialSettings, content, as_cell)
+        except FileErrors as error:
+            mistakes += error.errors
+        else:
+            varied = {name: value for name, value in values.items() if name not in fixed}
+            cells.append(Cell(varied, settings))
+    if mistakes or scenario is None:  # a wrong value makes one in each cell
+        raise FileErrors(list({str(mistake): mistake for mistake in mistakes}.values()))
+    return Sweep(scenario.name, tuple(cells), tuple(range(said.seed, said.seed + said.trials)))
+
+
+def _top(file: TomlFile, mistakes: list[FileError]) -> _File:
+    """Check the top; for what is wrong there the default stands in, so that the rest is checked."""
+    try:
+        return check_model(_File, file.content, file)
+    except FileErrors as error:
+        mistakes += error.errors
+        return _File.model_validate({"scenario": ""} | right_keys(_File, file.content))
+
+
+def _scenario(file: TomlFile, said: _File, mistakes: list[FileError]) -> Scenario | None:
+    """Load the scenario; None where it is wrong."""
+    if not isinstance(file.content.get("scenario"), str):
+        return None  # as was said of the top
+    beside = file.path.parent / said.scenario
+    try:
+        return load_scenario(beside if beside.is_file() else said.scenario)
+    except FileNotFoundError as error:
+        mistakes.append(file.error(("scenario",), f"scenario: {error}"))
+    except FileErrors as error:
+        mistakes += error.errors
+    except FileError as error:
+        mistakes.append(error)
+    return None
+
+
+def _refuse_unknown(
+    file: TomlFile, scenario: Scenario | None, said: _File, mistakes: list[FileError]
+) -> None:
+    """Refuse misspelt names whose values are wrong too, which are part of no cell."""
+    for table in ("grid", "random"):
+        for name, place, value in leaves((table,), getattr(said, table)):
+            content, as_cell = _cell(file, said, scenario, {name: value}, {name: place})
+            mistakes += unknown_keys(TrialSettings, content, as_cell)
+
+
+def _cell(
+    file: TomlFile,
+    said: _File,
+    scenario: Scenario | None,
+    values: Mapping[str, Any],
+    places: Mapping[str, Location],
+) -> tuple[dict[str, Any], CellFile]:
+    """Put values into the settings of a scenario and of the default estimator.
+
+    Without a scenario its settings are left out: nobody knows which are right.
+    """
+    if scenario is None:
+        scenario = load_scenario("paper")
+        values = {name: value for name, value in values.items() if name.split(".")[0] != "scenario"}
+    content: dict[str, Any] = {
+        "scenario": scenario.model_dump(),
+        "estimator": {},
+        "bound": said.bound,
+    }
+    lines: dict[Location, int] = {}
+    if ("bound",) in file.lines:
+        lines[("bound",)] = file.lines[("bound",)]
+    for name, value in values.items():
+        steps = tuple(name.split("."))
+        line = _line(file, places[name])
+        for length in range(len(steps), 0, -1):
+            lines.setdefault(steps[:length], line)
+        table = content
+        for step in steps[:-1]:
+            if not isinstance(table.get(step), dict):
+                table[step] = {}
+            table = table[step]
+        table[steps[-1]] = value
+    return content, CellFile(file.path, "", content, lines)
+
+
+def _line(file: TomlFile, location: Location) -> int:
+    return next(
+        file.lines[location[:length]]
+        for length in range(len(location), 0, -1)
+        if location[:length] in file.lines
+    )

@@ -1,0 +1,100 @@
+"""Run what is missing of a sweep, and tabulate all of it."""
+
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+from dqslam._version import version
+from dqslam.studies.pool import Backend, run_each
+from dqslam.studies.sweep.file import Sweep
+from dqslam.studies.sweep.store import Store
+from dqslam.studies.sweep.summary import SweepSummary, summarize
+from dqslam.studies.sweep.table import write_results
+from dqslam.studies.sweep.trial import Task, TrialResult, cell_key, run_task, trial_key
+
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class SweepRun:
+    """What a sweep gave, and how much of it was there already."""
+
+    summary: SweepSummary
+    done: int
+    """Trials that were run now."""
+    found: int
+    """Trials that an earlier run had finished."""
+    failures: dict[str, str]
+    """Errors of the trials that failed, by the names of their files without the suffix."""
+    files: tuple[Path, ...]
+    """What was written beside the trials."""
+
+
+def run_sweep(
+    sweep: Sweep,
+    folder: str | Path,
+    *,
+    jobs: int | None = None,
+    backend: Backend | None = None,
+    scheduler: str | None = None,
+    progress: Progress | None = None,
+) -> SweepRun:
+    """Run each trial of a sweep that is not in the folder yet, keep it there, and tabulate all.
+
+    Stopped or killed, it goes on from there when it is called again. A changed file runs what is
+    new in it; trials that it no longer has stay, and are not tabulated.
+
+    Parameters
+    ----------
+    folder
+        Where trials, results.csv, results.parquet (where pyarrow is installed) and summary.json go.
+    jobs, backend, scheduler
+        Where trials run, as in `pool.run_each`. The results do not depend on it.
+    progress
+        Called with (trials finished, trials) after each, those that were there among them.
+
+    Raises
+    ------
+    FileError
+        When the folder cannot be written, or has trials of another version of dqslam.
+    RuntimeError
+        When a worker has another version of dqslam, or a trial ends the process that runs it.
+    """
+    store = Store(folder)
+    cells = [cell_key(cell.settings) for cell in sweep.cells]
+    tasks = {
+        (key := trial_key(name, seed)): Task(key, cell.settings, seed)
+        for name, cell in zip(cells, sweep.cells, strict=True)
+        for seed in sweep.seeds
+    }
+    for name, cell in zip(cells, sweep.cells, strict=True):
+        store.describe_cell(name, cell.settings)
+    results = store.finished(tasks)
+    found = len(results)
+    missing = [task for key, task in tasks.items() if key not in results]
+    start = partial(run_each, jobs=jobs, backend=backend, scheduler=scheduler)
+    with closing(start(run_task, missing)) as running:
+        for result in running:
+            _check_version(result)
+            store.save(result)
+            results[result.key] = result
+            if progress is not None:
+                progress(len(results), len(tasks))
+    ordered = [[results[trial_key(name, seed)] for seed in sweep.seeds] for name in cells]
+    files = write_results(store.folder, sweep, cells, ordered)
+    summary = summarize(sweep, cells, ordered)
+    summary.save(store.folder / "summary.json")
+    return SweepRun(
+        summary=summary,
+        done=len(missing),
+        found=found,
+        failures={key: results[key].failure for key in tasks if results[key].failure},
+        files=(*files, store.folder / "summary.json"),
+    )
+
+
+def _check_version(result: TrialResult) -> None:
+    if result.version != version():
+        raise RuntimeError(f"a worker runs dqslam {result.version}, this is {version()}")

@@ -1,0 +1,135 @@
+"""One trial of a sweep: one cell, one seed."""
+
+import hashlib
+import json
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from dqslam._version import version
+from dqslam.simulation.simulator import simulate
+from dqslam.studies.paper import Outcome, seen_by, solve_and_score
+from dqslam.studies.sweep.settings import TrialSettings
+
+# What a trial measures, and the unit; "" is a share, a count, or yes and no as 1 and 0.
+METRICS = {
+    "odometry_rmse_pos": "m",
+    "rmse_pos": "m",
+    "rmse_landmark": "m",
+    "rmse_volume": "m^3",
+    "volume_relative_error": "",
+    "mapped": "",
+    "iterations": "",
+    "converged": "",
+    "worse_than_odometry": "",
+    # with `bound`
+    "bound": "m",
+    "error_over_bound": "",
+    "last_pose_nees": "",
+    "pose_nees": "",
+    "center_nees": "",
+    "is_optimum": "",
+    # where ids are wrong
+    "inlier_precision": "",
+    "inlier_recall": "",
+    "oracle_rmse_pos": "m",
+    "oracle_rmse_landmark": "m",
+    "dropped": "",
+}
+# Those that are 1 or 0 in each trial.
+YES_OR_NO = ("converged", "worse_than_odometry", "is_optimum")
+
+
+@dataclass(frozen=True)
+class Task:
+    """A trial that is to be run."""
+
+    key: str
+    settings: TrialSettings
+    seed: int
+
+
+@dataclass(frozen=True)
+class TrialResult:
+    """What came of a trial: the same wherever it runs, but for the time."""
+
+    key: str
+    seed: int
+    version: str | None
+    """Of dqslam, where the trial ran."""
+    seconds: float
+    """Wall clock."""
+    metrics: dict[str, float | None]
+    """By the names in METRICS, those that there are; None is no finite number."""
+    failure: str = ""
+    """The error, if it failed; there are no metrics then."""
+
+
+def cell_key(settings: TrialSettings) -> str:
+    """Return a name that two cells share only if all their settings are the same."""
+    text = json.dumps(settings.in_full(), sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def trial_key(cell: str, seed: int) -> str:
+    """Name the trial of a cell with a seed."""
+    return f"{cell}_{seed}"
+
+
+def run_task(task: Task) -> TrialResult:
+    """Run a trial; whatever error it ends with is kept."""
+    start = time.perf_counter()
+    metrics: dict[str, float | None] = {}
+    try:
+        recording, truth = simulate(task.settings.scenario, seed=task.seed)
+        outcome = solve_and_score(
+            seen_by(task.settings.input, recording),
+            truth,
+            task.settings.believed(),
+            task.settings.options(),
+            told=task.settings.options(loss="none"),
+            bound=task.settings.bound,
+        )
+        failure = outcome.failure
+        if not failure:
+            metrics = _metrics(outcome)
+    except Exception as error:  # of simulation, say: a world without a single box
+        failure = f"{type(error).__name__}: {error}"
+    seconds = time.perf_counter() - start
+    return TrialResult(task.key, task.seed, version(), seconds, metrics, failure)
+
+
+def _metrics(outcome: Outcome) -> dict[str, float | None]:
+    report, bound, robust = outcome.report, outcome.bound, outcome.robust
+    assert report is not None  # there is one where there is no failure
+    volumes = report.volume_relative_errors
+    found: dict[str, float] = {
+        "odometry_rmse_pos": report.odometry_rmse_pos,
+        "rmse_pos": report.rmse_pos,
+        "rmse_landmark": report.rmse_landmark,
+        "rmse_volume": report.rmse_volume,
+        "volume_relative_error": float(np.median(volumes)) if volumes else np.nan,
+        "mapped": report.mapped,
+        "iterations": outcome.iterations,
+        "converged": outcome.converged,
+        "worse_than_odometry": report.rmse_pos > report.odometry_rmse_pos,
+    }
+    if bound is not None:
+        found |= {
+            "bound": bound.bound,
+            "error_over_bound": report.rmse_pos / bound.bound,
+            "last_pose_nees": bound.last_pose_nees,
+            "pose_nees": bound.pose_nees,
+            "center_nees": bound.center_nees,
+            "is_optimum": bound.is_optimum,
+        }
+    if robust is not None:
+        found |= {
+            "inlier_precision": robust.precision,
+            "inlier_recall": robust.recall,
+            "oracle_rmse_pos": robust.oracle_rmse_pos,
+            "oracle_rmse_landmark": robust.oracle_rmse_landmark,
+            "dropped": robust.dropped,
+        }
+    return {name: float(value) if np.isfinite(value) else None for name, value in found.items()}

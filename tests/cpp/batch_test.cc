@@ -1,0 +1,153 @@
+#include "dqslam/geometry/batch.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <string>
+
+#include "dqslam/geometry/ellipsoid.h"
+#include "scene.h"
+
+namespace dqslam {
+namespace {
+
+template <typename Pose>
+class Rows : public testing::Test {
+ protected:
+  static constexpr int kRows = 5;
+
+  RowMatrix RandomPoses() {
+    RowMatrix poses(kRows, Pose::kSize);
+    for (int row = 0; row < kRows; ++row) poses.row(row) = random_.RandomPose<Pose>();
+    return poses;
+  }
+
+  Random random_{1};
+};
+
+using PoseTypes = testing::Types<Se2, Se3>;
+TYPED_TEST_SUITE(Rows, PoseTypes);
+
+TYPED_TEST(Rows, DoWhatThePoseModelDoesRowByRow) {
+  const RowMatrix a = this->RandomPoses(), b = this->RandomPoses();
+  const RowMatrix composed = ComposeRows(TypeParam::kModel, a, b);
+  const RowMatrix between = BetweenRows(TypeParam::kModel, a, b);
+  const RowMatrix minus = MinusRows(TypeParam::kModel, b, a);
+  const RowMatrix plus = PlusRows(TypeParam::kModel, a, minus);
+  ASSERT_EQ(composed.rows(), this->kRows);
+  for (int row = 0; row < this->kRows; ++row) {
+    Eigen::Matrix<double, TypeParam::kSize, 1> pose;
+    Eigen::Matrix<double, TypeParam::kTangentSize, 1> tangent;
+    TypeParam::Compose(a.row(row).data(), b.row(row).data(), pose.data());
+    TypeParam::Normalize(pose.data());
+    EXPECT_EQ(composed.row(row), pose.transpose());
+    TypeParam::Between(a.row(row).data(), b.row(row).data(), pose.data());
+    TypeParam::Normalize(pose.data());
+    EXPECT_EQ(between.row(row), pose.transpose());
+    Minus<TypeParam>(b.row(row).data(), a.row(row).data(), tangent.data());
+    EXPECT_EQ(minus.row(row), tangent.transpose());
+    Plus<TypeParam>(a.row(row).data(), tangent.data(), pose.data());
+    TypeParam::Normalize(pose.data());
+    EXPECT_EQ(plus.row(row), pose.transpose());
+  }
+}
+
+TYPED_TEST(Rows, DeadReckoningInvertsBetween) {
+  const RowMatrix poses = this->RandomPoses();
+  const int steps = this->kRows - 1;
+  const RowMatrix relative =
+      BetweenRows(TypeParam::kModel, poses.topRows(steps), poses.bottomRows(steps));
+  const RowMatrix again = DeadReckonRows(TypeParam::kModel, poses.row(0).transpose(), relative);
+  ASSERT_EQ(again.rows(), this->kRows);
+  EXPECT_LT(MinusRows(TypeParam::kModel, again, poses).cwiseAbs().maxCoeff(), 1e-12);
+}
+
+TYPED_TEST(Rows, CameraPosesAreThoseOfTheOracle) {
+  const Camera camera = SceneCamera();
+  const RowMatrix poses = this->RandomPoses();
+  const RowMatrix world_from_camera = WorldFromCameraRows(TypeParam::kModel, camera, poses);
+  for (int row = 0; row < this->kRows; ++row) {
+    const oracle::Viewpoint view = ViewFrom<TypeParam>(poses.row(row).data(), camera);
+    const Eigen::Matrix<double, 7, 1> found = world_from_camera.row(row);
+    EXPECT_LT((found.head<3>() - view.position).norm(), 1e-13);
+    EXPECT_LT((oracle::RotationMatrix(found.tail<4>()) - view.rotation).norm(), 1e-13);
+    EXPECT_NEAR(found.tail<4>().norm(), 1, 1e-14);
+  }
+}
+
+TYPED_TEST(Rows, BoxesAreThoseOfTheSampledSurface) {
+  const Scene scene = MakeScene<TypeParam>();
+  const BoxTable& boxes = scene.graph.boxes;
+  ASSERT_GT(boxes.size(), 50);
+  RowMatrix poses(boxes.size(), TypeParam::kSize), ellipsoids(boxes.size(), kLandmarkSize);
+  for (int row = 0; row < boxes.size(); ++row) {
+    poses.row(row) = scene.truth.poses.row(boxes.pose[row]);
+    ellipsoids.row(row) = scene.truth.landmarks.row(boxes.object[row]);
+  }
+  const auto [found, in_front] =
+      ProjectToBoxesRows(TypeParam::kModel, scene.graph.camera, poses, ellipsoids);
+  EXPECT_TRUE(in_front.all());
+  EXPECT_LT((found - boxes.box).cwiseAbs().maxCoeff(), 1e-6);
+}
+
+TEST(ProjectToBoxesRows, IsNanWhereTheObjectIsNotStrictlyInFront) {
+  RowMatrix poses = RowMatrix::Zero(3, 3), ellipsoids(3, kLandmarkSize);
+  ellipsoids.row(0) = Sphere({0, 5, 0}, 0.5);   // the camera looks left: in front
+  ellipsoids.row(1) = Sphere({0, -5, 0}, 0.5);  // behind
+  ellipsoids.row(2) = Sphere({0, 0, 0}, 0.5);   // around
+  const auto [boxes, in_front] =
+      ProjectToBoxesRows(PoseModel::kSe2, SceneCamera(), poses, ellipsoids);
+  EXPECT_TRUE(in_front[0] && boxes.row(0).allFinite());
+  for (const int row : {1, 2}) {
+    EXPECT_FALSE(in_front[row]);
+    EXPECT_TRUE(boxes.row(row).array().isNaN().all());
+  }
+}
+
+void ExpectShapeError(const std::string& message, const std::function<void()>& call) {
+  try {
+    call();
+    ADD_FAILURE() << "no exception: " << message;
+  } catch (const std::invalid_argument& error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr(message));
+  }
+}
+
+// Files give quaternions to nine digits: over a long path the norms would drift apart.
+TEST(DeadReckonRows, KeepsQuaternionsUnit) {
+  RowMatrix relative(5000, 7);
+  Eigen::Matrix<double, 1, 7> step;
+  step << 0.1, 0, 0, 0, 0, 0.1 * (1 + 1e-9), std::sqrt(0.99);
+  relative.rowwise() = step;
+  Eigen::VectorXd first = Eigen::VectorXd::Zero(7);
+  first[6] = 1;
+  const RowMatrix path = DeadReckonRows(PoseModel::kSe3, first, relative);
+  EXPECT_LT((path.rightCols<4>().rowwise().norm().array() - 1).abs().maxCoeff(), 1e-14);
+}
+
+TEST(RowShapes, NameTheTableOfTheWrongShape) {
+  const RowMatrix two = RowMatrix::Zero(2, 3), three = RowMatrix::Zero(3, 3);
+  const RowMatrix wide = RowMatrix::Zero(2, 7);
+  const Camera camera = SceneCamera();
+  const PoseModel se2 = PoseModel::kSe2, se3 = PoseModel::kSe3;
+  ExpectShapeError("a_from_b has shape (2, 7), expected (2, 3)",
+                   [&] { ComposeRows(se2, wide, two); });
+  ExpectShapeError("b_from_c has shape (3, 3), expected (2, 3)",
+                   [&] { ComposeRows(se2, two, three); });
+  ExpectShapeError("a_from_c has shape (3, 3)", [&] { BetweenRows(se2, two, three); });
+  ExpectShapeError("tangents has shape (2, 7), expected (2, 6)",
+                   [&] { PlusRows(se3, wide, wide); });
+  ExpectShapeError("origins has shape (3, 3)", [&] { MinusRows(se2, two, three); });
+  ExpectShapeError("first has shape (1, 2), expected (1, 3)",
+                   [&] { DeadReckonRows(se2, Eigen::Vector2d::Zero(), two); });
+  ExpectShapeError("relative has shape (2, 7)",
+                   [&] { DeadReckonRows(se2, Eigen::Vector3d::Zero(), wide); });
+  ExpectShapeError("poses has shape (2, 3), expected (2, 7)",
+                   [&] { WorldFromCameraRows(se3, camera, two); });
+  ExpectShapeError("ellipsoids has shape (2, 3), expected (2, 9)",
+                   [&] { ProjectToBoxesRows(se2, camera, two, two); });
+}
+
+}  // namespace
+}  // namespace dqslam

@@ -1,0 +1,86 @@
+#include "dqslam/estimation/graduated.h"
+
+#include <gtest/gtest.h>
+
+#include "cost_checks.h"
+#include "dqslam/costs/box.h"
+#include "dqslam/estimation/solve.h"
+#include "dqslam/solver/loss.h"
+#include "scene.h"
+
+namespace dqslam {
+namespace {
+
+TEST(DcsLoss, ByHandAndContinuous) {
+  const DcsLoss loss(2);
+  double rho[3];
+  loss.Evaluate(1, rho);
+  EXPECT_DOUBLE_EQ(rho[0], 1);
+  EXPECT_DOUBLE_EQ(rho[1], 1);
+  loss.Evaluate(6, rho);  // scale 2 * 2 / (2 + 6) = 1/2
+  EXPECT_DOUBLE_EQ(rho[0], 3 * 2 - 16.0 / 8);
+  EXPECT_DOUBLE_EQ(rho[1], 0.25);
+  loss.Evaluate(std::nextafter(2, 3), rho);
+  EXPECT_NEAR(rho[0], 2, 1e-12);
+  EXPECT_NEAR(rho[1], 1, 1e-12);
+}
+
+TEST(DcsLoss, DerivativesMatchDifferences) {
+  const DcsLoss loss(13.28);
+  for (const double s : {5.0, 14.0, 60.0, 1000.0}) {
+    constexpr double kStep = 1e-4;
+    double rho[3], above[3], below[3];
+    loss.Evaluate(s, rho);
+    loss.Evaluate(s + kStep, above);
+    loss.Evaluate(s - kStep, below);
+    EXPECT_NEAR(rho[1], (above[0] - below[0]) / (2 * kStep), 1e-7);
+    EXPECT_NEAR(rho[2], (above[1] - below[1]) / (2 * kStep), 1e-7);
+  }
+}
+
+// At the best switch w = phi / (phi + s), the cost is phi s / (phi + s).
+TEST(SwitchedCost, MinimisesToGemanMcClure) {
+  const Scene scene = MakeScene<Se2>();
+  constexpr double kPhi = 13.28;
+  using Box = BoxCost<Se2, EllipsoidModel>;
+  const Eigen::Vector4d observed =
+      scene.graph.boxes.box.row(0).transpose() + Eigen::Vector4d(3, -2, 4, 1);
+  const Box box{
+      {}, scene.graph.camera, Mount(scene.graph.camera), observed, Eigen::Matrix4d::Identity()};
+  const CostPointer cost(SwitchedCost<Se2, Box>::Create(box, std::sqrt(kPhi)));
+  const double s = 9 + 4 + 16 + 1;
+  const Eigen::Vector3d pose = scene.truth.poses.row(scene.graph.boxes.pose[0]);
+  const Vector9d landmark = scene.truth.landmarks.row(scene.graph.boxes.object[0]);
+  const Block switch_block{Eigen::VectorXd::Constant(1, kPhi / (kPhi + s)),
+                           std::make_shared<ceres::EuclideanManifold<1>>()};
+  const std::vector<Block> blocks = {PoseBlock<Se2>(pose), LandmarkBlock(landmark), switch_block};
+  EXPECT_NEAR(ResidualOf(*cost, blocks).squaredNorm(), kPhi * s / (kPhi + s), 1e-4);
+  ExpectJacobiansMatchPerturbation(*cost, blocks);
+}
+
+// A tenth of the boxes go to the next object; exact measurements otherwise.
+TEST(RobustSolve, FindsTheTruthAndTheWrongBoxes) {
+  Scene scene = MakeScene<Se3>();
+  BoxTable& boxes = scene.graph.boxes;
+  std::vector<bool> wrong(boxes.size(), false);
+  for (int row = 7; row < boxes.size(); row += 10) {
+    boxes.object[row] = (boxes.object[row] + 1) % scene.graph.num_objects();
+    wrong[row] = true;
+  }
+  for (const Loss loss :
+       {Loss::kCauchy, Loss::kDcs, Loss::kSwitchable, Loss::kGncTls, Loss::kGncGm}) {
+    SolveOptions options;
+    options.loss = loss;
+    const Solution solution = Solve(scene.graph, options, {});
+    const double largest = (solution.poses - scene.truth.poses).leftCols<3>().cwiseAbs().maxCoeff();
+    EXPECT_LT(largest, 0.02) << "loss " << static_cast<int>(loss);  // Cauchy keeps a small pull
+    int mistaken = 0;
+    for (int row = 0; row < boxes.size(); ++row) mistaken += solution.inliers[row] == wrong[row];
+    EXPECT_LE(mistaken, 1) << "loss " << static_cast<int>(loss);
+  }
+  const Solution plain = Solve(scene.graph, SolveOptions(), {});
+  EXPECT_GT((plain.poses - scene.truth.poses).leftCols<3>().cwiseAbs().maxCoeff(), 0.05);
+}
+
+}  // namespace
+}  // namespace dqslam

@@ -1,0 +1,89 @@
+"""A sweep on a dask cluster of two worker processes, of which one is killed."""
+
+import json
+import os
+import subprocess
+import sys
+import time
+from contextlib import ExitStack
+
+import pytest
+
+from dqslam.studies.sweep import load_sweep, run_sweep
+
+pytest.importorskip("distributed")
+
+SWEEP = """\
+scenario = "paper"
+trials = 8
+
+[fixed]
+scenario.path.laps = 1
+scenario.world.object_count = 4
+
+[grid]
+scenario.odometry.rotation_sigma_rad = [0.01, 0.02, 0.03]
+"""
+TRIALS = 24
+
+
+@pytest.fixture
+def cluster(tmp_path):
+    """Give the address of a scheduler and its two workers, which nothing starts again."""
+    address = tmp_path / "scheduler.json"
+    with ExitStack() as stack:
+
+        def start(*arguments):
+            process = subprocess.Popen(
+                [sys.executable, "-m", *arguments, "--no-dashboard"],
+                env=os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
+                stderr=subprocess.DEVNULL,
+            )
+            stack.callback(process.wait)
+            stack.callback(process.kill)
+            return process
+
+        where = ["--host", "127.0.0.1", "--scheduler-file", str(address)]
+        start("distributed.cli.dask_scheduler", *where, "--port", "0")
+        while not address.exists():
+            time.sleep(0.02)
+        worker = ["distributed.cli.dask_worker", *where, "--nthreads", "1", "--no-nanny"]
+        workers = [start(*worker, "--local-directory", str(tmp_path / name)) for name in "ab"]
+        scheduler = json.loads(address.read_text())["address"]
+        _wait_for_workers(scheduler, 2)
+        yield scheduler, workers
+
+
+def _wait_for_workers(scheduler, count):
+    from distributed import Client
+
+    with Client(scheduler, set_as_default=False) as client:
+        client.wait_for_workers(count, timeout=50)
+
+
+def test_a_worker_is_killed_and_nothing_is_lost_or_counted_twice(cluster, tmp_path):
+    scheduler, (victim, survivor) = cluster
+    path = tmp_path / "sweep.toml"
+    path.write_text(SWEEP)
+    sweep = load_sweep(path)
+    told = []
+
+    def kill_at_the_sixth(done, trials):
+        told.append((done, trials))
+        if done == 6:
+            victim.kill()
+
+    done = run_sweep(
+        sweep, tmp_path / "dask", backend="dask", scheduler=scheduler, progress=kill_at_the_sixth
+    )
+    assert victim.wait(timeout=10) == -9
+    assert survivor.poll() is None
+    assert (done.done, done.found, done.failures) == (TRIALS, 0, {})
+    assert told == [(count, TRIALS) for count in range(1, TRIALS + 1)]
+    assert len(list((tmp_path / "dask" / "trials").iterdir())) == TRIALS
+    run_sweep(sweep, tmp_path / "serial", backend="serial")
+    for name in ("results.csv", "summary.json"):
+        assert (tmp_path / "dask" / name).read_bytes() == (tmp_path / "serial" / name).read_bytes()
+    rows = (tmp_path / "dask" / "results.csv").read_text().splitlines()[1:]
+    trials = {tuple(row.split(",")[:3]) for row in rows}
+    assert len(rows) == len(trials) == TRIALS
