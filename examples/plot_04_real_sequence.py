@@ -39,7 +39,7 @@ if is_real:
     _, poses = io.read_trajectory(segment / "groundtruth.txt")
     true = io.read_true_objects(segment / "objects_gt.csv")
     true_centers = true.center[true.static]
-    recording = perturb_odometry(recording, io.OdometryNoise(0.02, 0.01), seed=0)
+    recording = perturb_odometry(recording, dq.OdometryNoise(0.02, 0.01), seed=0)
 else:
     print("no real recording here (set DQSLAM_REALDATA): a simulated one takes its place")
     recording, truth = dq.simulate(dq.load_scenario("orbit"), seed=0)

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from dqslam import _core
-from dqslam.io import FileError, OdometryNoise, load_recording, nearest_pose
+from dqslam.assumptions import OdometryNoise
+from dqslam.io import FileError, load_recording, nearest_pose
 from orbit import NAMES, write_orbit
 
 

@@ -6,7 +6,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from benchmarks.problems import chain
-from test_associate_judge import circle
 
 import dqslam as dq
 from dqslam.association.thinning import thin_recording
@@ -17,6 +16,7 @@ from dqslam.online.integrated_odometry import Leg
 from dqslam.online.keyframes import Journal
 from dqslam.online.look_back import Reach
 from scenes import CAMERA, Film, Thing, film, orbit_poses, switched_ids, table_things
+from test_association_consistency import circle
 
 NOISE = OdometryNoise(0.02, 0.01)
 BOXES = BoxNoise(1.0, 0.02)
