@@ -66,10 +66,10 @@ class Residuals:
     def __init__(self, graph: Graph) -> None:
         """Take the arrays out of the graph once."""
         core = self._core = graph.core
-        self._box_pose, self._box_object = core.box_pose, core.box_object
-        self._boxes, self._sigma_px = core.boxes, np.sqrt(core.box_covariance[:, ::5])
-        covariance = core.odometry_covariance.reshape(-1, 3, 3)
-        self._odometry = core.odometry
+        self._box_pose, self._box_object = core.boxes.pose, core.boxes.object
+        self._boxes, self._sigma_px = core.boxes.box, np.sqrt(core.boxes.covariance[:, ::5])
+        covariance = core.odometry.covariance.reshape(-1, 3, 3)
+        self._odometry = core.odometry.relative
         self._whiten = np.linalg.inv(np.linalg.cholesky(covariance))
         camera = core.camera
         focal, middle = np.array([camera.fx, camera.fy]), np.array([camera.cx, camera.cy])
@@ -117,7 +117,7 @@ class Residuals:
             rows = np.arange(len(columns))
             return coo_matrix((np.ones(len(columns)), (rows, columns)), (len(columns), count))
 
-        steps = incidence(core.odometry_from, poses) + incidence(core.odometry_to, poses)
+        steps = incidence(core.odometry.from_pose, poses) + incidence(core.odometry.to_pose, poses)
         seen = incidence(self._box_object, objects)
         return bmat(
             [
@@ -162,10 +162,10 @@ class Residuals:
         factors = _factors(ellipsoids)
         values, axes = np.linalg.eigh(factors @ factors.transpose(0, 2, 1))
         log = np.einsum("oik,ok,ojk->oij", axes, 0.5 * np.log(values), axes)
-        log -= self._core.log_size_mean[:, None, None] * np.eye(3)
+        log -= self._core.size_prior.log_mean[:, None, None] * np.eye(3)
         beside = np.sqrt(2.0) * log[:, [0, 1, 2], [1, 2, 0]]
         own = np.diagonal(log, axis1=1, axis2=2)
-        return np.asarray(np.hstack([own, beside]) / self._core.log_size_sigma[:, None])
+        return np.asarray(np.hstack([own, beside]) / self._core.size_prior.log_sigma[:, None])
 
 
 def _factors(ellipsoids: Floats) -> Floats:

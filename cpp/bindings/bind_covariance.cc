@@ -1,4 +1,5 @@
 #include <pybind11/eigen.h>
+#include <pybind11/native_enum.h>
 #include <pybind11/stl.h>
 
 #include "bindings.h"
@@ -10,6 +11,15 @@ using namespace pybind11::literals;
 namespace dqslam {
 
 void BindCovariance(py::module_& m) {
+  py::class_<UnderConstrained> under_constrained(
+      m, "UnderConstrained", "A parameter that neither the data nor the priors determine.");
+  py::native_enum<UnderConstrained::Kind>(under_constrained, "Kind", "enum.Enum")
+      .value("POSE", UnderConstrained::Kind::kPose)
+      .value("OBJECT", UnderConstrained::Kind::kObject)
+      .finalize();
+  under_constrained.def_readonly("kind", &UnderConstrained::kind)
+      .def_readonly("row", &UnderConstrained::row, "Of the pose or the object in the graph.")
+      .def_readonly("parameter", &UnderConstrained::parameter, "Of its tangent.");
   py::class_<Covariance>(m, "Covariance", "Marginal covariances; the first pose is the gauge.")
       .def_readonly("poses",
                     &Covariance::poses,
@@ -19,7 +29,7 @@ void BindCovariance(py::module_& m) {
                     "Of the landmark parameters, shape (o, 81); NaN where under-constrained.")
       .def_readonly("under_constrained",
                     &Covariance::under_constrained,
-                    "One sentence for each pose or object that nothing determines.");
+                    "The first such parameter of each pose and object.");
   m.def("covariance",
         &ComputeCovariance,
         "graph"_a,

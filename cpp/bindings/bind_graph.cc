@@ -8,8 +8,55 @@ namespace py = pybind11;
 using namespace pybind11::literals;
 
 namespace dqslam {
+namespace {
 
-void BindGraph(py::module_& m) {
+void BindTables(py::module_& m) {
+  py::class_<OdometryTable>(m, "OdometryTable", "Relative poses between poses. Immutable.")
+      .def(py::init<IndexVector, IndexVector, RowMatrix, RowMatrix>(),
+           py::kw_only(),
+           "from_pose"_a,
+           "to_pose"_a,
+           "relative"_a,
+           "covariance"_a,
+           "With d the size of a pose and k of its tangent.")
+      .def_readonly("from_pose", &OdometryTable::from, "Shape (m,).")
+      .def_readonly("to_pose", &OdometryTable::to, "Shape (m,).")
+      .def_readonly("relative", &OdometryTable::relative, "to_in_from, shape (m, d).")
+      .def_readonly("covariance", &OdometryTable::covariance, "Shape (m, k * k).");
+  py::class_<BoxTable>(m, "BoxTable", "Boxes whose object is known. Immutable.")
+      .def(py::init<IndexVector, IndexVector, RowMatrix, RowMatrix, BoolTable>(),
+           py::kw_only(),
+           "pose"_a,
+           "object"_a,
+           "box"_a,
+           "covariance"_a,
+           "truncated"_a)
+      .def_readonly("pose", &BoxTable::pose, "Shape (b,).")
+      .def_readonly("object", &BoxTable::object, "Shape (b,).")
+      .def_readonly("box", &BoxTable::box, "Undistorted pixels, shape (b, 4).")
+      .def_readonly("covariance", &BoxTable::covariance, "Pixels squared, shape (b, 16).")
+      .def_readonly("truncated", &BoxTable::truncated, "Edges cut by the image border, (b, 4).");
+  py::class_<MeasurementTable>(
+      m, "MeasurementTable", "Measurements of one kind between poses and objects. Immutable.")
+      .def(py::init<std::string, IndexVector, IndexVector, RowMatrix, RowMatrix>(),
+           py::kw_only(),
+           "kind"_a,
+           "pose"_a,
+           "object"_a,
+           "value"_a,
+           "covariance"_a)
+      .def_readonly("kind", &MeasurementTable::kind, "\"position\" or \"range\".")
+      .def_readonly("pose", &MeasurementTable::pose, "Shape (n,).")
+      .def_readonly("object", &MeasurementTable::object, "Shape (n,).")
+      .def_readonly("value", &MeasurementTable::value, "What was measured, shape (n, m).")
+      .def_readonly("covariance", &MeasurementTable::covariance, "Shape (n, m * m).");
+  py::class_<SizePriorTable>(m, "SizePriorTable", "Prior on the size of each object. Immutable.")
+      .def(py::init<Eigen::VectorXd, Eigen::VectorXd>(), py::kw_only(), "log_mean"_a, "log_sigma"_a)
+      .def_readonly("log_mean", &SizePriorTable::log_mean, "Of semi-axes, log meters, shape (o,).")
+      .def_readonly("log_sigma", &SizePriorTable::log_sigma, "Shape (o,).");
+}
+
+void BindScenePriors(py::module_& m) {
   py::class_<ScenePriors>(
       m, "ScenePriors", "What is known of the scene; each part is off while its sigma is 0.")
       .def(py::init([](const py::kwargs& values) {
@@ -28,36 +75,30 @@ void BindGraph(py::module_& m) {
           "support_sigma", &ScenePriors::support_sigma, "Each object stands on the ground: meters.")
       .def_readwrite("camera_height", &ScenePriors::camera_height, "Meters above the ground.")
       .def_readwrite("camera_height_sigma", &ScenePriors::camera_height_sigma, "Meters.");
+}
+
+}  // namespace
+
+void BindGraph(py::module_& m) {
+  BindTables(m);
+  BindScenePriors(m);
   py::class_<Graph>(m, "Graph", "The problem as plain tables; ids are row numbers. Immutable.")
       .def(py::init([](PoseModel pose_model,
                        const Camera& camera,
                        RowMatrix initial_poses,
-                       IndexVector odometry_from,
-                       IndexVector odometry_to,
-                       RowMatrix odometry,
-                       RowMatrix odometry_covariance,
-                       IndexVector box_pose,
-                       IndexVector box_object,
-                       RowMatrix boxes,
-                       RowMatrix box_covariance,
-                       std::optional<BoolTable> box_truncated,
-                       IndexVector position_pose,
-                       IndexVector position_object,
-                       RowMatrix positions,
-                       RowMatrix position_covariance,
-                       Eigen::VectorXd log_size_mean,
-                       Eigen::VectorXd log_size_sigma,
+                       OdometryTable odometry,
+                       BoxTable boxes,
+                       SizePriorTable size_prior,
+                       std::vector<MeasurementTable> measurements,
                        const ScenePriors& scene_priors) {
-             const BoolTable none = BoolTable::Constant(boxes.rows(), kBoxSize, false);
-             Graph graph{
-                 pose_model,
-                 camera,
-                 std::move(initial_poses),
-                 {odometry_from, odometry_to, odometry, odometry_covariance},
-                 {box_pose, box_object, boxes, box_covariance, box_truncated.value_or(none)},
-                 {position_pose, position_object, positions, position_covariance},
-                 {log_size_mean, log_size_sigma},
-                 scene_priors};
+             Graph graph{pose_model,
+                         camera,
+                         initial_poses,
+                         odometry,
+                         boxes,
+                         measurements,
+                         size_prior,
+                         scene_priors};
              Validate(graph, /*poses_known=*/true);  // solve() asks for odometry where it needs it
              return graph;
            }),
@@ -65,49 +106,19 @@ void BindGraph(py::module_& m) {
            "camera"_a,
            py::kw_only(),
            "initial_poses"_a,
-           "odometry_from"_a,
-           "odometry_to"_a,
            "odometry"_a,
-           "odometry_covariance"_a,
-           "box_pose"_a,
-           "box_object"_a,
            "boxes"_a,
-           "box_covariance"_a,
-           "box_truncated"_a = std::nullopt,
-           "position_pose"_a = IndexVector(),
-           "position_object"_a = IndexVector(),
-           "positions"_a = RowMatrix(0, 3),
-           "position_covariance"_a = RowMatrix(0, 9),
-           "log_size_mean"_a,
-           "log_size_sigma"_a,
+           "size_prior"_a,
+           "measurements"_a = std::vector<MeasurementTable>(),
            "scene_priors"_a = ScenePriors(),
-           "Shapes, with d the size of a pose and k of its tangent: initial_poses (n, d); odometry "
-           "(m, d), to_in_from, with covariance (m, k * k); boxes (b, 4) undistorted pixels with "
-           "covariance (b, 16) and box_truncated (b, 4), edges cut by the image border; positions "
-           "(p, 3) object_in_robot, meters, with covariance (p, 9); "
-           "log_size_mean and log_size_sigma (o,), of semi-axes in log meters.")
+           "initial_poses (n, d): dead reckoning, or the known poses when mapping.")
       .def_readonly("pose_model", &Graph::pose_model)
       .def_readonly("camera", &Graph::camera)
       .def_readonly("initial_poses", &Graph::initial_poses, "Shape (n, d).")
-      .def_property_readonly("odometry_from", [](const Graph& g) { return g.odometry.from; })
-      .def_property_readonly("odometry_to", [](const Graph& g) { return g.odometry.to; })
-      .def_property_readonly("odometry", [](const Graph& g) { return g.odometry.relative; })
-      .def_property_readonly("odometry_covariance",
-                             [](const Graph& g) { return g.odometry.covariance; })
-      .def_property_readonly("box_pose", [](const Graph& g) { return g.boxes.pose; })
-      .def_property_readonly("box_object", [](const Graph& g) { return g.boxes.object; })
-      .def_property_readonly("boxes", [](const Graph& g) { return g.boxes.box; })
-      .def_property_readonly("box_covariance", [](const Graph& g) { return g.boxes.covariance; })
-      .def_property_readonly("box_truncated", [](const Graph& g) { return g.boxes.truncated; })
-      .def_property_readonly("position_pose", [](const Graph& g) { return g.positions.pose; })
-      .def_property_readonly("position_object", [](const Graph& g) { return g.positions.object; })
-      .def_property_readonly("positions",
-                             [](const Graph& g) { return g.positions.object_in_robot; })
-      .def_property_readonly("position_covariance",
-                             [](const Graph& g) { return g.positions.covariance; })
-      .def_property_readonly("log_size_mean", [](const Graph& g) { return g.size_prior.log_mean; })
-      .def_property_readonly("log_size_sigma",
-                             [](const Graph& g) { return g.size_prior.log_sigma; })
+      .def_readonly("odometry", &Graph::odometry)
+      .def_readonly("boxes", &Graph::boxes)
+      .def_readonly("size_prior", &Graph::size_prior)
+      .def_readonly("measurements", &Graph::measurements, "One table a kind.")
       .def_readonly("scene_priors", &Graph::scene_priors)
       .def_property_readonly("num_poses", &Graph::num_poses)
       .def_property_readonly("num_objects", &Graph::num_objects);

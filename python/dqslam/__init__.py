@@ -43,6 +43,7 @@ if TYPE_CHECKING:  # what type checkers see; a test holds it and the table below
     from dqslam.online import steps_of as steps_of
     from dqslam.plot import plot_maps as plot_maps
     from dqslam.recording import Detections as Detections
+    from dqslam.recording import Measurements as Measurements
     from dqslam.recording import Odometry as Odometry
     from dqslam.recording import Recording as Recording
     from dqslam.recording import RelativePositions as RelativePositions
@@ -89,7 +90,14 @@ _NAMES = {
     ),
     "dqslam.plot": ("plot_maps",),
     "dqslam.graph": ("Graph", "build_graph", "solve"),
-    "dqslam.recording": ("Detections", "Odometry", "Recording", "RelativePositions", "Truth"),
+    "dqslam.recording": (
+        "Detections",
+        "Measurements",
+        "Odometry",
+        "Recording",
+        "RelativePositions",
+        "Truth",
+    ),
     "dqslam.simulation": ("Scenario", "load_scenario", "simulate"),
     "dqslam.assumptions": (
         "BoxNoise",

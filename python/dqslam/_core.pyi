@@ -13,14 +13,17 @@ import numpy.typing
 
 __all__: list[str] = [
     "Backend",
+    "BoxTable",
     "Camera",
     "Covariance",
     "Fit",
     "Graph",
     "LandmarkModel",
     "Loss",
+    "MeasurementTable",
     "Minimizer",
     "Mode",
+    "OdometryTable",
     "OnlineOptions",
     "PoseModel",
     "Relocation",
@@ -28,12 +31,14 @@ __all__: list[str] = [
     "ScenePriors",
     "Schedule",
     "Session",
+    "SizePriorTable",
     "Solution",
     "SolveOptions",
     "Start",
     "State",
     "StepReport",
     "Summary",
+    "UnderConstrained",
     "axes_from_ellipsoid",
     "between",
     "compose",
@@ -141,6 +146,141 @@ class Camera:
         Pixels.
         """
 
+class OdometryTable:
+    """
+    Relative poses between poses. Immutable.
+    """
+    def __init__(
+        self,
+        *,
+        from_pose: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
+        to_pose: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
+        relative: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+        covariance: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    ) -> None:
+        """
+        With d the size of a pose and k of its tangent.
+        """
+    @property
+    def covariance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Shape (m, k * k).
+        """
+    @property
+    def from_pose(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]:
+        """
+        Shape (m,).
+        """
+    @property
+    def relative(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        to_in_from, shape (m, d).
+        """
+    @property
+    def to_pose(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]:
+        """
+        Shape (m,).
+        """
+
+class BoxTable:
+    """
+    Boxes whose object is known. Immutable.
+    """
+    def __init__(
+        self,
+        *,
+        pose: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
+        object: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
+        box: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+        covariance: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+        truncated: typing.Annotated[numpy.typing.ArrayLike, numpy.bool, "[m, n]"],
+    ) -> None: ...
+    @property
+    def box(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Undistorted pixels, shape (b, 4).
+        """
+    @property
+    def covariance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Pixels squared, shape (b, 16).
+        """
+    @property
+    def object(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]:
+        """
+        Shape (b,).
+        """
+    @property
+    def pose(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]:
+        """
+        Shape (b,).
+        """
+    @property
+    def truncated(self) -> typing.Annotated[numpy.typing.NDArray[numpy.bool], "[m, n]"]:
+        """
+        Edges cut by the image border, (b, 4).
+        """
+
+class MeasurementTable:
+    """
+    Measurements of one kind between poses and objects. Immutable.
+    """
+    def __init__(
+        self,
+        *,
+        kind: str,
+        pose: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
+        object: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
+        value: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+        covariance: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    ) -> None: ...
+    @property
+    def covariance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Shape (n, m * m).
+        """
+    @property
+    def kind(self) -> str:
+        """
+        "position" or "range".
+        """
+    @property
+    def object(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]:
+        """
+        Shape (n,).
+        """
+    @property
+    def pose(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]:
+        """
+        Shape (n,).
+        """
+    @property
+    def value(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        What was measured, shape (n, m).
+        """
+
+class SizePriorTable:
+    """
+    Prior on the size of each object. Immutable.
+    """
+    def __init__(
+        self,
+        *,
+        log_mean: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        log_sigma: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    ) -> None: ...
+    @property
+    def log_mean(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        Of semi-axes, log meters, shape (o,).
+        """
+    @property
+    def log_sigma(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        Shape (o,).
+        """
+
 class ScenePriors:
     """
     What is known of the scene; each part is off while its sigma is 0.
@@ -204,38 +344,17 @@ class Graph:
         camera: Camera,
         *,
         initial_poses: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
-        odometry_from: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
-        odometry_to: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
-        odometry: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
-        odometry_covariance: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
-        box_pose: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
-        box_object: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
-        boxes: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
-        box_covariance: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
-        box_truncated: typing.Annotated[numpy.typing.ArrayLike, numpy.bool, "[m, n]"] | None = None,
-        position_pose: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"] = ...,
-        position_object: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"] = ...,
-        positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"] = ...,
-        position_covariance: typing.Annotated[
-            numpy.typing.ArrayLike, numpy.float64, "[m, n]"
-        ] = ...,
-        log_size_mean: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-        log_size_sigma: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        odometry: OdometryTable,
+        boxes: BoxTable,
+        size_prior: SizePriorTable,
+        measurements: collections.abc.Sequence[MeasurementTable] = [],
         scene_priors: ScenePriors = ...,
     ) -> None:
         """
-        Shapes, with d the size of a pose and k of its tangent: initial_poses (n, d); odometry (m, d), to_in_from, with covariance (m, k * k); boxes (b, 4) undistorted pixels with covariance (b, 16) and box_truncated (b, 4), edges cut by the image border; positions (p, 3) object_in_robot, meters, with covariance (p, 9); log_size_mean and log_size_sigma (o,), of semi-axes in log meters.
+        initial_poses (n, d): dead reckoning, or the known poses when mapping.
         """
     @property
-    def box_covariance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]: ...
-    @property
-    def box_object(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]: ...
-    @property
-    def box_pose(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]: ...
-    @property
-    def box_truncated(self) -> typing.Annotated[numpy.typing.NDArray[numpy.bool], "[m, n]"]: ...
-    @property
-    def boxes(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]: ...
+    def boxes(self) -> BoxTable: ...
     @property
     def camera(self) -> Camera: ...
     @property
@@ -244,37 +363,22 @@ class Graph:
         Shape (n, d).
         """
     @property
-    def log_size_mean(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
-    @property
-    def log_size_sigma(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    def measurements(self) -> list[MeasurementTable]:
+        """
+        One table a kind.
+        """
     @property
     def num_objects(self) -> int: ...
     @property
     def num_poses(self) -> int: ...
     @property
-    def odometry(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]: ...
-    @property
-    def odometry_covariance(
-        self,
-    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]: ...
-    @property
-    def odometry_from(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]: ...
-    @property
-    def odometry_to(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]: ...
+    def odometry(self) -> OdometryTable: ...
     @property
     def pose_model(self) -> PoseModel: ...
     @property
-    def position_covariance(
-        self,
-    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]: ...
-    @property
-    def position_object(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]: ...
-    @property
-    def position_pose(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]: ...
-    @property
-    def positions(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]: ...
-    @property
     def scene_priors(self) -> ScenePriors: ...
+    @property
+    def size_prior(self) -> SizePriorTable: ...
 
 class Mode(enum.Enum):
     """
@@ -573,6 +677,27 @@ class Solution:
         Of each object's SVD start, shape (o, 10), descending; NaN where not used.
         """
 
+class UnderConstrained:
+    """
+    A parameter that neither the data nor the priors determine.
+    """
+    class Kind(enum.Enum):
+        OBJECT: typing.ClassVar[UnderConstrained.Kind]
+        POSE: typing.ClassVar[UnderConstrained.Kind]
+
+    @property
+    def kind(self) -> UnderConstrained.Kind: ...
+    @property
+    def parameter(self) -> int:
+        """
+        Of its tangent.
+        """
+    @property
+    def row(self) -> int:
+        """
+        Of the pose or the object in the graph.
+        """
+
 class Covariance:
     """
     Marginal covariances; the first pose is the gauge.
@@ -588,9 +713,9 @@ class Covariance:
         In the frames of the poses, shape (n, k * k); NaN where under-constrained.
         """
     @property
-    def under_constrained(self) -> list[str]:
+    def under_constrained(self) -> list[UnderConstrained]:
         """
-        One sentence for each pose or object that nothing determines.
+        The first such parameter of each pose and object.
         """
 
 class Fit:
@@ -683,7 +808,7 @@ class OnlineOptions:
     @property
     def loop_absence(self) -> int:
         """
-        Poses without a sight before an object closes a loop.
+        Poses without a observation before an object closes a loop.
         """
     @loop_absence.setter
     def loop_absence(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
@@ -791,7 +916,7 @@ class StepReport:
     @property
     def linearized(self) -> int:
         """
-        Sights, in the window and to keep what lies before it.
+        Observations, in the window and to keep what lies before it.
         """
     @property
     def pose(self) -> int:
@@ -804,19 +929,19 @@ class StepReport:
         Young objects were started again.
         """
     @property
+    def smoothed_observations(self) -> int:
+        """
+        Observations linearized there.
+        """
+    @property
     def smoothed_poses(self) -> int:
         """
         Poses minimized beside the window; 0 at most steps.
         """
     @property
-    def smoothed_observations(self) -> int:
-        """
-        Sights linearized there.
-        """
-    @property
     def undefined(self) -> int:
         """
-        Sights of the window whose objects are not in front.
+        Observations of the window whose objects are not in front.
         """
     @property
     def window_objects(self) -> int:
@@ -893,14 +1018,14 @@ class Session:
         """
     def relabel(
         self,
-        sight: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
+        observation: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
         object: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
         ellipsoid: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"] = ...,
         log_size_mean: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] = ...,
         log_size_sigma: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] = ...,
     ) -> None:
         """
-        Give boxes (n,), by the rows of their sights, to other objects (n,): -1 waits, num_objects + i is a new object that starts from ellipsoid (m, 9), log-Cholesky, in the world.
+        Give boxes (n,), by the rows of their observations, to other objects (n,): -1 waits, num_objects + i is a new object that starts from ellipsoid (m, 9), log-Cholesky, in the world.
         """
     def scale_odometry(
         self,

@@ -8,7 +8,7 @@ from dqslam import _core
 from dqslam._checks import Bools, Floats, Ints, as_floats, reject_rows
 from dqslam.assumptions import BoxNoise, SizePrior, SizePriors
 from dqslam.estimate import Estimate
-from dqslam.recording import Detections, Recording, RelativePositions
+from dqslam.recording import Detections, Measurements, Recording
 
 # Two boxes do not tell an object's distance from its size.
 FEWEST_INLIER_VIEWS = 3
@@ -68,19 +68,25 @@ def build_graph(
         initial_poses=_core.dead_reckon(
             odometry.pose_model, odometry.first_pose, odometry.relative
         ),
-        odometry_from=steps,
-        odometry_to=steps + 1,
-        odometry=odometry.relative,
-        odometry_covariance=_flat(odometry.covariance),
-        box_pose=detections.pose,
-        box_object=box_object,
-        boxes=detections.box,
-        box_covariance=_flat(box_noise.covariance(detections.box)),
-        box_truncated=detections.truncated,
-        log_size_mean=np.array([prior.log_mean for prior in priors]),
-        log_size_sigma=np.array([prior.log_sigma for prior in priors]),
+        odometry=_core.OdometryTable(
+            from_pose=steps,
+            to_pose=steps + 1,
+            relative=odometry.relative,
+            covariance=_flat(odometry.covariance),
+        ),
+        boxes=_core.BoxTable(
+            pose=detections.pose,
+            object=box_object,
+            box=detections.box,
+            covariance=_flat(box_noise.covariance(detections.box)),
+            truncated=detections.truncated,
+        ),
+        size_prior=_core.SizePriorTable(
+            log_mean=np.array([prior.log_mean for prior in priors]),
+            log_sigma=np.array([prior.log_sigma for prior in priors]),
+        ),
+        measurements=[_table(each, object_ids) for each in _measurements(recording)],
         scene_priors=_core.ScenePriors() if scene_priors is None else scene_priors,
-        **_position_arrays(recording.positions, object_ids),
     )
     return Graph(
         core=core,
@@ -132,7 +138,7 @@ def solve(
 def _unfit(graph: Graph, inliers: Bools) -> dict[int, str]:
     """Say by id which objects too few boxes fit, and how few."""
     views = _inlier_views(graph.core, inliers)
-    fit = np.bincount(graph.core.box_object[inliers], minlength=len(views))
+    fit = np.bincount(graph.core.boxes.object[inliers], minlength=len(views))
     needed = np.ceil(np.minimum(ENOUGH_INLIERS, ENOUGH_INLIER_SHARE * graph.observations))
     reasons = {}
     for row, object_id in enumerate(graph.object_ids.tolist()):
@@ -149,7 +155,7 @@ def _unfit(graph: Graph, inliers: Bools) -> dict[int, str]:
 
 def _inlier_views(core: _core.Graph, inliers: Bools) -> Ints:
     """Return from how many poses boxes that fit show each object, shape (o,)."""
-    pairs = np.column_stack([core.box_object, core.box_pose])[inliers]
+    pairs = np.column_stack([core.boxes.object, core.boxes.pose])[inliers]
     seen = np.unique(pairs, axis=0)
     return np.bincount(seen[:, 0], minlength=core.num_objects)
 
@@ -183,19 +189,32 @@ def _class_names(detections: Detections, box_object: Ints, objects: int) -> tupl
     return tuple(detections.class_names[int(classes[row])] for row in votes.argmax(axis=1))
 
 
-def _position_arrays(
-    positions: RelativePositions | None, object_ids: Ints
-) -> dict[str, Floats | Ints]:
-    if positions is None or not len(positions):
-        return {}
-    has_no_box = ~np.isin(positions.object_id, object_ids)
-    reject_rows("positions.object_id", has_no_box, "the object has no box", positions.object_id)
-    return {
-        "position_pose": positions.pose,
-        "position_object": np.searchsorted(object_ids, positions.object_id),
-        "positions": positions.object_in_robot,
-        "position_covariance": _flat(positions.covariance),
-    }
+def _measurements(recording: Recording) -> list[Measurements]:
+    """Return what was measured beside boxes, the kind of positions first."""
+    positions = recording.positions
+    if positions is None:
+        return list(recording.measurements)
+    of_centers = Measurements(
+        "position",
+        positions.pose,
+        positions.object_id,
+        positions.object_in_robot,
+        positions.covariance,
+    )
+    return [of_centers, *recording.measurements]
+
+
+def _table(measured: Measurements, object_ids: Ints) -> _core.MeasurementTable:
+    has_no_box = ~np.isin(measured.object_id, object_ids)
+    name = f"{measured.kind}.object_id"
+    reject_rows(name, has_no_box, "the object has no box", measured.object_id)
+    return _core.MeasurementTable(
+        kind=measured.kind,
+        pose=measured.pose,
+        object=np.searchsorted(object_ids, measured.object_id),
+        value=measured.value,
+        covariance=_flat(measured.covariance),
+    )
 
 
 def _flat(covariance: Floats) -> Floats:

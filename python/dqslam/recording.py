@@ -153,6 +153,41 @@ class RelativePositions:
 
 
 @dataclass(frozen=True, eq=False)
+class Measurements:
+    """Measurements of one kind between poses and objects, m numbers each.
+
+    Kinds are those of the core: "position" (m = 3, the center in the robot frame, meters) and
+    "range" (m = 1, the distance from the robot to the center, meters).
+    """
+
+    kind: str
+    pose: Ints
+    """Row of the pose it was measured from, shape (p,)."""
+    object_id: Ints
+    """Shape (p,)."""
+    value: Floats
+    """Shape (p, m)."""
+    covariance: Floats
+    """Shape (p, m, m)."""
+
+    def __post_init__(self) -> None:
+        """Check shapes and numbers; the core knows the kinds."""
+        value = as_floats(f"{self.kind}.value", self.value, [None, None])
+        count, size = value.shape
+        _set(
+            self,
+            pose=as_ints(f"{self.kind}.pose", self.pose, count),
+            object_id=as_ints(f"{self.kind}.object_id", self.object_id, count),
+            value=value,
+            covariance=as_covariances(f"{self.kind}.covariance", self.covariance, count, size),
+        )
+
+    def __len__(self) -> int:
+        """Return the number of measurements."""
+        return len(self.value)
+
+
+@dataclass(frozen=True, eq=False)
 class Recording:
     """All that an estimator may see."""
 
@@ -162,6 +197,8 @@ class Recording:
     odometry: Odometry
     detections: Detections
     positions: RelativePositions | None = None
+    measurements: tuple[Measurements, ...] = ()
+    """Beside boxes and positions, one entry a kind."""
 
     def __post_init__(self) -> None:
         """Check that the parts belong together."""
@@ -177,6 +214,8 @@ class Recording:
         _check_poses("detections.pose", self.detections.pose, count)
         if self.positions is not None:
             _check_poses("positions.pose", self.positions.pose, count)
+        for measured in self.measurements:
+            _check_poses(f"{measured.kind}.pose", measured.pose, count)
         self._check_boxes_meet_image()
         _set(self, timestamps=timestamps)
 

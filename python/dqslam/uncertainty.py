@@ -3,39 +3,36 @@
 Gauge: the first pose is fixed; everything is relative to it.
 """
 
-import re
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from dqslam import _core
-from dqslam._checks import Bools, Floats
+from dqslam._checks import Bools, Floats, Ints
 from dqslam._core import LandmarkModel, Mode, SolveOptions
 from dqslam.estimate import Estimate
 from dqslam.graph import Graph
 from dqslam.metrics import true_rows
 from dqslam.recording import Truth
 
-_TABLES = (
-    "initial_poses",
-    "odometry_from",
-    "odometry_to",
-    "odometry",
-    "odometry_covariance",
-    "box_pose",
-    "box_object",
-    "boxes",
-    "box_covariance",
-    "box_truncated",
-    "position_pose",
-    "position_object",
-    "positions",
-    "position_covariance",
-    "log_size_mean",
-    "log_size_sigma",
-    "scene_priors",
-)
+
+@dataclass(frozen=True)
+class UnderConstrained:
+    """A parameter of a pose or an object that neither the data nor the priors determine."""
+
+    kind: Literal["pose", "object"]
+    name: int
+    """Row of the pose, or id of the object."""
+    parameter: int
+    """Of its tangent."""
+
+    def __str__(self) -> str:
+        """Say it in a sentence."""
+        return (
+            f"{self.kind} {self.name}: parameter {self.parameter} is not determined by the data "
+            "and the priors"
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,8 +43,8 @@ class Marginals:
     """In the frame of each pose, translation [m] first, then rotation [rad]; (n, k, k)."""
     objects: Floats
     """Of center [m] and log-Cholesky shape, shape (o, 9, 9)."""
-    under_constrained: tuple[str, ...]
-    """A sentence for each pose (row) or object (id) that nothing determines, and why."""
+    under_constrained: tuple[UnderConstrained, ...]
+    """One entry for each pose and object that nothing determines."""
 
     @property
     def centers(self) -> Floats:
@@ -136,41 +133,57 @@ def chi_square_interval(freedom: int) -> list[float]:
 
 
 def _marginals(
-    core: _core.Graph, object_ids: Any, options: SolveOptions, state: _core.State
+    core: _core.Graph, object_ids: Ints, options: SolveOptions, state: _core.State
 ) -> Marginals:
     found = _core.covariance(core, options, state)
     size = round(found.poses.shape[1] ** 0.5)
     return Marginals(
         poses=found.poses.reshape(-1, size, size),
         objects=found.objects.reshape(-1, 9, 9),
-        under_constrained=tuple(
-            re.sub(r"^object (\d+)", lambda row: f"object {object_ids[int(row[1])]}", sentence)
-            for sentence in found.under_constrained
-        ),
+        under_constrained=tuple(_named(each, object_ids) for each in found.under_constrained),
     )
+
+
+def _named(found: _core.UnderConstrained, object_ids: Ints) -> UnderConstrained:
+    if found.kind == _core.UnderConstrained.Kind.POSE:
+        return UnderConstrained("pose", found.row, found.parameter)
+    return UnderConstrained("object", int(object_ids[found.row]), found.parameter)
 
 
 def _rebuilt(core: _core.Graph, **changes: Any) -> _core.Graph:
     """Return a problem with some of its tables replaced."""
-    tables = {name: getattr(core, name) for name in _TABLES} | changes
+    names = ("initial_poses", "odometry", "boxes", "size_prior", "measurements", "scene_priors")
+    tables = {name: getattr(core, name) for name in names} | changes
     return _core.Graph(core.pose_model, core.camera, **tables)
 
 
 def _only_objects(core: _core.Graph, kept: Bools) -> _core.Graph:
     """Return a problem without the other objects, kept (o,), and what was measured of them."""
     row = np.cumsum(kept) - 1
-    box, position = kept[core.box_object], kept[core.position_object]
+    boxes, prior = core.boxes, core.size_prior
+    box = kept[boxes.object]
     return _rebuilt(
         core,
-        box_pose=core.box_pose[box],
-        box_object=row[core.box_object[box]],
-        boxes=core.boxes[box],
-        box_covariance=core.box_covariance[box],
-        box_truncated=core.box_truncated[box],
-        position_pose=core.position_pose[position],
-        position_object=row[core.position_object[position]],
-        positions=core.positions[position],
-        position_covariance=core.position_covariance[position],
-        log_size_mean=core.log_size_mean[kept],
-        log_size_sigma=core.log_size_sigma[kept],
+        boxes=_core.BoxTable(
+            pose=boxes.pose[box],
+            object=row[boxes.object[box]],
+            box=boxes.box[box],
+            covariance=boxes.covariance[box],
+            truncated=boxes.truncated[box],
+        ),
+        size_prior=_core.SizePriorTable(
+            log_mean=prior.log_mean[kept], log_sigma=prior.log_sigma[kept]
+        ),
+        measurements=[_only_kept(table, kept, row) for table in core.measurements],
+    )
+
+
+def _only_kept(table: _core.MeasurementTable, kept: Bools, row: Ints) -> _core.MeasurementTable:
+    part = kept[table.object]
+    return _core.MeasurementTable(
+        kind=table.kind,
+        pose=table.pose[part],
+        object=row[table.object[part]],
+        value=table.value[part],
+        covariance=table.covariance[part],
     )

@@ -11,10 +11,7 @@ constexpr int kTrials = 50;
 
 template <typename Types>
 class EdgesOf : public testing::Test {};
-using AllTypes = testing::Types<std::pair<Se2, EllipsoidModel>,
-                                std::pair<Se3, EllipsoidModel>,
-                                std::pair<Se2, DualQuadricModel>,
-                                std::pair<Se3, DualQuadricModel>>;
+using AllTypes = testing::Types<std::pair<Se2, EllipsoidModel>, std::pair<Se3, EllipsoidModel>>;
 TYPED_TEST_SUITE(EdgesOf, AllTypes);
 
 /// Of unweighted errors, beside AutoDiff's of the cost: relative to its largest entry.

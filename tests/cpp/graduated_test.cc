@@ -4,6 +4,7 @@
 
 #include "cost_checks.h"
 #include "dqslam/costs/box.h"
+#include "dqslam/costs/switched.h"
 #include "dqslam/estimation/solve.h"
 #include "dqslam/solver/loss.h"
 #include "scene.h"

@@ -21,10 +21,11 @@ template <typename Pose>
 Graph GoodGraph() {
   static const Scene scene = MakeScene<Pose>(3, 0.05);
   Graph graph = scene.graph;
-  graph.positions.pose = IndexVector::Constant(1, 2);
-  graph.positions.object = IndexVector::Constant(1, 1);
-  graph.positions.object_in_robot = RowMatrix::Ones(1, 3);
-  graph.positions.covariance = Eigen::Matrix3d::Identity().reshaped().transpose();
+  graph.measurements = {{"position",
+                         IndexVector::Constant(1, 2),
+                         IndexVector::Constant(1, 1),
+                         RowMatrix::Ones(1, 3),
+                         Eigen::Matrix3d::Identity().reshaped().transpose()}};
   return graph;
 }
 
@@ -124,14 +125,16 @@ TEST(Validate, NamesTheObjectThatIsWrong) {
       {"log_size_sigma row 3: must be positive", [](Graph& g) { g.size_prior.log_sigma[3] = 0; }},
       {"log_size_sigma row 3: must be positive", [](Graph& g) { g.size_prior.log_sigma[3] = -1; }},
       {"log_size_sigma has shape (4, 1)", [](Graph& g) { g.size_prior.log_sigma.resize(4); }},
-      {"position_pose row 0: unknown id 7", [](Graph& g) { g.positions.pose[0] = 7; }},
-      {"position_object row 0: unknown id 7", [](Graph& g) { g.positions.object[0] = 7; }},
-      {"positions row 0: NaN", [](Graph& g) { g.positions.object_in_robot(0, 1) = kNan; }},
-      {"positions has shape (1, 2)", [](Graph& g) { g.positions.object_in_robot.resize(1, 2); }},
+      {"measurements: there is no kind 'color'",
+       [](Graph& g) { g.measurements[0].kind = "color"; }},
+      {"position_pose row 0: unknown id 7", [](Graph& g) { g.measurements[0].pose[0] = 7; }},
+      {"position_object row 0: unknown id 7", [](Graph& g) { g.measurements[0].object[0] = 7; }},
+      {"position_value row 0: NaN", [](Graph& g) { g.measurements[0].value(0, 1) = kNan; }},
+      {"position_value has shape (1, 2)", [](Graph& g) { g.measurements[0].value.resize(1, 2); }},
       {"position_covariance has shape (0, 9)",
-       [](Graph& g) { g.positions.covariance.resize(0, 9); }},
+       [](Graph& g) { g.measurements[0].covariance.resize(0, 9); }},
       {"position_covariance row 0: covariance is not symmetric positive definite",
-       [](Graph& g) { g.positions.covariance *= -1; }},
+       [](Graph& g) { g.measurements[0].covariance *= -1; }},
   });
 }
 

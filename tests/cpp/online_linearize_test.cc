@@ -63,10 +63,10 @@ void ExpectDerivatives(double distance, bool is_box, bool truncated) {
     Linear<Pose> linear;
     Linearize<Pose>(model, station(pose), observation, center_shape, Edges::kBox, &linear);
     double unused;
-    EXPECT_NEAR(
-        linear.cost,
-        CostOfObservation(model, station(pose), observation, center_shape, linear.depth, &unused),
-        1e-9 * (1 + linear.cost));
+    EXPECT_NEAR(linear.cost,
+                CostOfObservation<Pose>(
+                    model, station(pose), observation, center_shape, linear.depth, &unused),
+                1e-9 * (1 + linear.cost));
     EXPECT_EQ(linear.depth > 0, is_box && distance < 2);
     const Eigen::VectorXd by_pose = linear.by_pose.transpose() * linear.residual;
     for (int i = 0; i < Pose::kTangentSize; ++i) {
@@ -77,7 +77,7 @@ void ExpectDerivatives(double distance, bool is_box, bool truncated) {
         tangent[i] = side == 0 ? -kStep : kStep;
         typename History<Pose>::Storage moved;
         Plus<Pose>(pose.data(), tangent.data(), moved.data());
-        cost[side] = CostOfObservation(
+        cost[side] = CostOfObservation<Pose>(
             model, station(moved), observation, center_shape, linear.depth, &unused);
       }
       EXPECT_NEAR(by_pose[i], (cost[1] - cost[0]) / (2 * kStep), 1e-4 * (1 + by_pose.norm()));
@@ -85,9 +85,9 @@ void ExpectDerivatives(double distance, bool is_box, bool truncated) {
     const Vector9d by_object = linear.by_object.transpose() * linear.residual;
     for (int i = 0; i < 9; ++i) {
       const Vector9d d = kStep * Vector9d::Unit(i);
-      const double ahead = CostOfObservation(
+      const double ahead = CostOfObservation<Pose>(
           model, station(pose), observation, center_shape + d, linear.depth, &unused);
-      const double behind = CostOfObservation(
+      const double behind = CostOfObservation<Pose>(
           model, station(pose), observation, center_shape - d, linear.depth, &unused);
       EXPECT_NEAR(by_object[i], (ahead - behind) / (2 * kStep), 1e-4 * (1 + by_object.norm()));
     }

@@ -4,6 +4,7 @@
 
 #include <vector>
 
+#include "dqslam/costs/measurements.h"
 #include "dqslam/geometry/ellipsoid.h"
 #include "dqslam/problem/graph.h"
 #include "oracle.h"
@@ -115,6 +116,19 @@ void MeasureBoxes(const Camera& camera,
   table->box = Eigen::Map<RowMatrix>(boxes[0].data(), rows, kBoxSize);
   table->covariance = Eigen::Matrix4d::Identity().reshaped().transpose().replicate(rows, 1);
   table->truncated = BoolTable::Constant(rows, kBoxSize, false);
+}
+
+/// Two measurements of each kind beside boxes, which do not fit.
+inline void AddMeasurements(Graph* graph) {
+  for (int kind = 0; kind < kNumMeasurementKinds; ++kind) {
+    const int m = MeasurementSize(kind);
+    const Eigen::MatrixXd covariance = 0.04 * Eigen::MatrixXd::Identity(m, m);
+    graph->measurements.push_back({MeasurementName(kind),
+                                   IndexVector::LinSpaced(2, 3, 7),
+                                   IndexVector::LinSpaced(2, 1, 2),
+                                   RowMatrix::Constant(2, m, 4.0),
+                                   covariance.reshaped().transpose().replicate(2, 1)});
+  }
 }
 
 template <typename Pose>

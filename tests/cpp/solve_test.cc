@@ -192,13 +192,14 @@ TEST_F(SolveTest, CostCountsOdometryAndPositionsAndSizes) {
   EXPECT_NEAR(CostAtTruth(graph), 4.5, 1e-6);
 
   graph = scene_.graph;
-  graph.positions.pose = IndexVector::Constant(1, 0);
-  graph.positions.object = IndexVector::Constant(1, 2);
   const Eigen::Vector3d center = scene_.truth.landmarks.row(2).head<3>();
   // The robot starts at (5, 0) and drives along +y: its left is -x.
-  graph.positions.object_in_robot = RowMatrix(1, 3);
-  graph.positions.object_in_robot << center.y(), 5 - center.x(), center.z() + 0.2;
-  graph.positions.covariance = 0.01 * Eigen::Matrix3d::Identity().reshaped().transpose();
+  const Eigen::RowVector3d object_in_robot(center.y(), 5 - center.x(), center.z() + 0.2);
+  graph.measurements = {{"position",
+                         IndexVector::Constant(1, 0),
+                         IndexVector::Constant(1, 2),
+                         object_in_robot,
+                         0.01 * Eigen::Matrix3d::Identity().reshaped().transpose()}};
   EXPECT_NEAR(CostAtTruth(graph), 2, 1e-6);
 
   graph = scene_.graph;

@@ -65,19 +65,21 @@ def test_graph_arrays_by_hand():
         atol=1e-12,
     )
     np.testing.assert_array_equal(
-        np.column_stack([core.odometry_from, core.odometry_to]), [[0, 1], [1, 2]]
+        np.column_stack([core.odometry.from_pose, core.odometry.to_pose]), [[0, 1], [1, 2]]
     )
-    np.testing.assert_array_equal(core.odometry_covariance[0], [1, 0, 0, 0, 2, 0, 0, 0, 3])
-    np.testing.assert_array_equal(core.box_pose, [0, 1, 2])
-    np.testing.assert_array_equal(core.box_object, [1, 0, 1])
-    np.testing.assert_array_equal(core.boxes, BOXES)
+    np.testing.assert_array_equal(core.odometry.covariance[0], [1, 0, 0, 0, 2, 0, 0, 0, 3])
+    np.testing.assert_array_equal(core.boxes.pose, [0, 1, 2])
+    np.testing.assert_array_equal(core.boxes.object, [1, 0, 1])
+    np.testing.assert_array_equal(core.boxes.box, BOXES)
     # The first box is 40 px wide and 100 px high.
     expected = np.diag([9.0 + 16.0, 9.0 + 100.0, 9.0 + 16.0, 9.0 + 100.0])
-    np.testing.assert_allclose(core.box_covariance[0].reshape(4, 4), expected)
-    np.testing.assert_array_equal([core.position_pose[0], core.position_object[0]], [2, 1])
-    np.testing.assert_array_equal(core.position_covariance, [[4, 0, 0, 0, 5, 0, 0, 0, 6]])
-    np.testing.assert_array_equal(core.log_size_mean, [-1.5, -1.5])
-    np.testing.assert_array_equal(core.log_size_sigma, [0.4, 0.4])
+    np.testing.assert_allclose(core.boxes.covariance[0].reshape(4, 4), expected)
+    (positions,) = core.measurements
+    assert positions.kind == "position"
+    np.testing.assert_array_equal([positions.pose[0], positions.object[0]], [2, 1])
+    np.testing.assert_array_equal(positions.covariance, [[4, 0, 0, 0, 5, 0, 0, 0, 6]])
+    np.testing.assert_array_equal(core.size_prior.log_mean, [-1.5, -1.5])
+    np.testing.assert_array_equal(core.size_prior.log_sigma, [0.4, 0.4])
 
 
 def test_every_class_has_its_own_size_prior():
@@ -88,8 +90,8 @@ def test_every_class_has_its_own_size_prior():
         recording(detections=boxes), size_prior=SizePriors({"bowl": bowl}, default=other)
     )
     assert graph.class_names == ("cup", "bowl")
-    np.testing.assert_array_equal(graph.core.log_size_mean, [-1.0, -2.0])
-    np.testing.assert_array_equal(graph.core.log_size_sigma, [0.9, 0.1])
+    np.testing.assert_array_equal(graph.core.size_prior.log_mean, [-1.0, -2.0])
+    np.testing.assert_array_equal(graph.core.size_prior.log_sigma, [0.9, 0.1])
 
 
 def test_scene_priors_and_cut_edges_reach_the_core():
@@ -97,7 +99,7 @@ def test_scene_priors_and_cut_edges_reach_the_core():
     boxes = replace(recording().detections, truncated=cut)
     known = ScenePriors(upright_sigma=0.02, support_sigma=0.05, plane_offset=-0.5)
     core = build_graph(recording(detections=boxes), scene_priors=known).core
-    np.testing.assert_array_equal(core.box_truncated, cut)
+    np.testing.assert_array_equal(core.boxes.truncated, cut)
     priors = core.scene_priors
     assert (priors.upright_sigma, priors.support_sigma, priors.plane_offset) == (0.02, 0.05, -0.5)
     off = build_graph(recording()).core.scene_priors
@@ -117,7 +119,7 @@ def test_an_objects_class_is_the_one_most_of_its_boxes_have():
 
 
 def test_positions_are_optional():
-    assert len(build_graph(recording(positions=None)).core.positions) == 0
+    assert not build_graph(recording(positions=None)).core.measurements
 
 
 def without_id():

@@ -45,13 +45,13 @@ def test_motions_start_at_the_origin_and_are_what_they_say():
 def test_boxes_have_the_noise_that_the_graph_states():
     graph, ellipsoid = observe(MOTIONS["full loop"], np.random.default_rng(0))
     core = graph.core
-    seen = core.initial_poses[core.box_pose]
+    seen = core.initial_poses[core.boxes.pose]
     exact, _ = _core.project_to_boxes(
         core.pose_model, core.camera, seen, np.tile(ellipsoid, (len(seen), 1))
     )
     assert len(seen) > 25
-    assert (core.boxes - exact).std() == pytest.approx(1.0, abs=0.15)
-    np.testing.assert_allclose(core.box_covariance, np.tile(np.eye(4).ravel(), (len(seen), 1)))
+    assert (core.boxes.box - exact).std() == pytest.approx(1.0, abs=0.15)
+    np.testing.assert_allclose(core.boxes.covariance, np.tile(np.eye(4).ravel(), (len(seen), 1)))
     np.testing.assert_allclose(core.initial_poses, MOTIONS["full loop"].poses, atol=1e-12)
 
 

@@ -264,7 +264,7 @@ def test_who_is_told_the_right_ids_is_scored_on_the_same_objects():
     graph = Beliefs().graph(replace(recording, positions=None))
     estimate, _ = solve(graph, SolveOptions())
     half = replace(estimate, **{name: getattr(estimate, name)[::2] for name in PER_OBJECT})
-    score = score_robust(graph, graph.core.box_object >= 0, truth, half, SolveOptions())
+    score = score_robust(graph, graph.core.boxes.object >= 0, truth, half, SolveOptions())
     assert (score.precision, score.dropped) == (1.0, 0)
     assert score.oracle_rmse_pos == evaluate(estimate, truth).rmse_pos
     assert score.oracle_rmse_landmark == pytest.approx(evaluate(half, truth).rmse_landmark)

@@ -3,17 +3,22 @@
 
 #include <ceres/autodiff_cost_function.h>
 
-#include <utility>
-
 namespace dqslam {
 
-template <typename Functor, int kResidualSize, int... kBlockSizes>
+template <typename Functor, int kResiduals, int... kBlockSizes>
 struct AutoDiffCost {
+  static constexpr int kResidualSize = kResiduals;
+
   /// A Ceres cost function around Functor{members...}, in their order.  The caller owns it.
   template <typename... Members>
   static ceres::CostFunction* Create(const Members&... members) {
-    return new ceres::AutoDiffCostFunction<Functor, kResidualSize, kBlockSizes...>(
-        new Functor{{}, members...});
+    return CreateFrom(Functor{{}, members...});
+  }
+
+  /// The same around a copy of a functor.
+  static ceres::CostFunction* CreateFrom(const Functor& functor) {
+    return new ceres::AutoDiffCostFunction<Functor, kResiduals, kBlockSizes...>(
+        new Functor(functor));
   }
 };
 

@@ -13,8 +13,9 @@ namespace dqslam {
 template <typename Pose, typename Landmark>
 struct RelativePositionCost
     : AutoDiffCost<RelativePositionCost<Pose, Landmark>, 3, Pose::kSize, kLandmarkSize> {
-  Eigen::Vector3d object_in_robot;  ///< meters
-  Eigen::Matrix3d sqrt_information;
+  static constexpr const char* kName = "position";
+  Eigen::Vector3d value;             ///< object_in_robot, meters
+  Eigen::Matrix3d sqrt_information;  ///< 1 / meters
 
   template <typename T>
   bool operator()(const T* pose, const T* landmark, T* residual) const {
@@ -22,7 +23,7 @@ struct RelativePositionCost
     const Vector3<T> center = Landmark::Unpack(landmark).center;
     const Vector3<T> predicted =
         world_from_robot.rotation.transpose() * (center - world_from_robot.translation);
-    Whiten<3, T>(sqrt_information, object_in_robot.cast<T>() - predicted, residual);
+    Whiten<3, T>(sqrt_information, value.cast<T>() - predicted, residual);
     return true;
   }
 };

@@ -64,16 +64,15 @@ Covariance ComputeCovariance(const Graph& graph, const SolveOptions& options, co
   int offset = 0;
   for (int b = 0; b < static_cast<int>(information.block_sizes.size()); ++b) {
     const int size = information.block_sizes[b];
-    auto row = b < information.num_free_poses
-                   ? covariance.poses.row(information.first_free_pose + b)
-                   : covariance.objects.row(b - information.num_free_poses);
+    const bool is_pose = b < information.num_free_poses;
+    const int of_table = is_pose ? information.first_free_pose + b : b - information.num_free_poses;
+    auto row = is_pose ? covariance.poses.row(of_table) : covariance.objects.row(of_table);
     const Eigen::MatrixXd block = inverse.Block(offset, size);
     row = block.reshaped().transpose();
     for (int i = 0; i < size; ++i) {
       if (block(i, i) * information.matrix.coeff(offset + i, offset + i) < kUndetermined) continue;
-      covariance.under_constrained.push_back(information.NameOf(b) + ": parameter " +
-                                             std::to_string(i) +
-                                             " is not determined by the data and the priors");
+      using Kind = UnderConstrained::Kind;
+      covariance.under_constrained.push_back({is_pose ? Kind::kPose : Kind::kObject, of_table, i});
       row.setConstant(std::nan(""));
       break;
     }

@@ -4,18 +4,24 @@
 // Gauge: the first pose is fixed, so that its covariance is zero and all others are relative to it.
 #pragma once
 
-#include <string>
 #include <vector>
 
 #include "dqslam/solver/stage.h"
 
 namespace dqslam {
 
+/// A parameter that neither the data nor the priors determine.
+struct UnderConstrained {
+  enum class Kind { kPose, kObject };
+  Kind kind;
+  int row;        ///< of the pose or the object in the graph
+  int parameter;  ///< of its tangent
+};
+
 struct Covariance {
   RowMatrix poses;    ///< (poses, k * k) in the frames of the poses; NaN where under-constrained
   RowMatrix objects;  ///< (objects, 81) of the landmark parameters; NaN where under-constrained
-  /// One sentence for each pose or object that the data and the priors do not determine.
-  std::vector<std::string> under_constrained;
+  std::vector<UnderConstrained> under_constrained;  ///< the first parameter of each block
 };
 
 /// Marginal covariances at a state.  At the true state this is the posterior Cramer-Rao bound.

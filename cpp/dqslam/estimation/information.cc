@@ -1,15 +1,14 @@
 #include "dqslam/estimation/information.h"
 
-#include <ceres/crs_matrix.h>
-#include <ceres/problem.h>
-
 #include <algorithm>
+#include <array>
 #include <numeric>
 #include <stdexcept>
 
 #include "dqslam/estimation/graduated.h"
 #include "dqslam/estimation/repair.h"
-#include "dqslam/solver/assembly.h"
+#include "dqslam/geometry/dispatch.h"
+#include "dqslam/solver/linearize.h"
 
 namespace dqslam {
 namespace {
@@ -41,6 +40,114 @@ Stage StageOfInliers(const PreparedGraph& prepared,
   return stage;
 }
 
+// A visitor of terms that makes the Jacobian of each a group of rows.
+template <typename Pose, typename Landmark>
+class JacobianRows {
+ public:
+  JacobianRows(const PreparedGraph& prepared,
+               const SolveOptions& options,
+               const VariableIndex& variables,
+               const State& state)
+      : prepared_(prepared), options_(options), variables_(variables), state_(state) {}
+
+  template <typename Cost, typename... Rows>
+  bool Visit(const Cost& cost, const Rows&... rows) {
+    Matrix<Cost::kResidualSize, 1> residual;
+    Matrix<Cost::kResidualSize, (kTangentOf<Rows> + ...)> jacobian;
+    if (!Differentiate(cost, &residual, &jacobian, ParametersOf(rows)...)) return false;
+    Add(residual, jacobian, rows...);
+    return true;
+  }
+
+  bool VisitBox(const StageBox& box) {
+    const PoseRow pose{prepared_.graph.boxes.pose[box.row]};
+    const ObjectRow object{prepared_.graph.boxes.object[box.row]};
+    if constexpr (Landmark::kModel == LandmarkModel::kEllipsoid) {
+      if (!IsAlgebraic(box.residual.residual)) return VisitEdges(box, pose, object);
+    }
+    return VisitBoxCost<Pose, Landmark>(
+        prepared_, options_, box, [&](const auto& cost) { return Visit(cost, pose, object); });
+  }
+
+  void MoveTo(Information* information) {
+    const int rows = static_cast<int>(residuals_.size());
+    information->residuals = Eigen::Map<const Eigen::VectorXd>(residuals_.data(), rows);
+    starts_.push_back(static_cast<int>(columns_.size()));
+    information->jacobian = Eigen::Map<const Eigen::SparseMatrix<double, Eigen::RowMajor>>(
+        rows,
+        variables_.num_free_poses() * Pose::kTangentSize + variables_.num_objects() * kLandmarkSize,
+        starts_.back(),
+        starts_.data(),
+        columns_.data(),
+        values_.data());
+  }
+
+ private:
+  template <typename Row>
+  static constexpr int kTangentOf =
+      std::is_same_v<Row, PoseRow> ? Pose::kTangentSize : kLandmarkSize;
+
+  PoseParameters<Pose> ParametersOf(PoseRow pose) const {
+    return {state_.poses.row(pose.row).data()};
+  }
+  ObjectParameters ParametersOf(ObjectRow object) const {
+    return {state_.landmarks.row(object.row).data()};
+  }
+  int ColumnOf(PoseRow pose) const { return variables_.TangentOfPose(pose.row); }
+  int ColumnOf(ObjectRow object) const {
+    return variables_.TangentOfObject(variables_.slot_of_object[object.row]);
+  }
+
+  // Boxes and tangents, differentiated by hand.
+  bool VisitEdges(const StageBox& box, PoseRow pose, ObjectRow object) {
+    Matrix<kBoxSize, 1> residual;
+    Matrix<kBoxSize, Pose::kTangentSize> by_pose;
+    Matrix<kBoxSize, kLandmarkSize> by_object;
+    const Station station = Station::At<Pose>(ParametersOf(pose).values, prepared_.mount);
+    const Unpacked<EllipsoidModel> ellipsoid(ParametersOf(object).values);
+    if (!LinearizeBox<Pose, true>(
+            prepared_, box, station, ellipsoid, &residual, &by_pose, &by_object)) {
+      return false;
+    }
+    Matrix<kBoxSize, Pose::kTangentSize + kLandmarkSize> jacobian;
+    jacobian << by_pose, by_object;
+    Add(residual, jacobian, pose, object);
+    return true;
+  }
+
+  // Columns within a row ascend: a reversed step of odometry has its later pose first.
+  template <int m, int kColumns, typename... Rows>
+  void Add(const Matrix<m, 1>& residual, const Matrix<m, kColumns>& jacobian, const Rows&... rows) {
+    struct Block {
+      int column, first, size;
+    };
+    int first = 0;
+    std::array<Block, sizeof...(Rows)> blocks{
+        Block{ColumnOf(rows), (first += kTangentOf<Rows>)-kTangentOf<Rows>, kTangentOf<Rows>}...};
+    std::sort(blocks.begin(), blocks.end(), [](const Block& a, const Block& b) {
+      return a.column < b.column;
+    });
+    for (int i = 0; i < m; ++i) {
+      residuals_.push_back(residual[i]);
+      starts_.push_back(static_cast<int>(columns_.size()));
+      for (const Block& block : blocks) {
+        if (block.column < 0) continue;  // constant
+        for (int c = 0; c < block.size; ++c) {
+          columns_.push_back(block.column + c);
+          values_.push_back(jacobian(i, block.first + c));
+        }
+      }
+    }
+  }
+
+  const PreparedGraph& prepared_;
+  const SolveOptions& options_;
+  const VariableIndex& variables_;
+  const State& state_;
+  std::vector<double> residuals_, values_;
+  std::vector<int> starts_, columns_;
+};
+
 }  // namespace
 
 int Information::PoseColumn(int pose) const {
@@ -52,48 +159,28 @@ int Information::ObjectColumn(int object) const {
   return std::accumulate(begin, begin + num_free_poses, 0) + object * kLandmarkSize;
 }
 
-std::string Information::NameOf(int block) const {
-  return block < num_free_poses ? "pose " + std::to_string(block + first_free_pose)
-                                : "object " + std::to_string(block - num_free_poses);
-}
-
-Information ComputeInformation(const Graph& graph, const SolveOptions& options, State state) {
+Information ComputeInformation(const Graph& graph,
+                               const SolveOptions& options,
+                               const State& state) {
   const PreparedGraph prepared(graph, options.mode == Mode::kMapping);
   CheckState(graph, state);
-  const Stage stage = StageOfInliers(prepared, options, state);
-  ceres::Problem problem;
-  Assemble(prepared, options, stage, &state, &problem);
+  const StageTerms terms =
+      SelectTerms(prepared, options, StageOfInliers(prepared, options, state), state);
 
   Information information;
-  information.first_free_pose = stage.first_free_pose;
-  information.num_free_poses = graph.num_poses() - stage.first_free_pose;
-  information.num_boxes =
-      graph.boxes.size() -
-      static_cast<int>(std::count(stage.weights.begin(), stage.weights.end(), 0.0));
-  ceres::Problem::EvaluateOptions evaluate;
-  for (int pose = stage.first_free_pose; pose < graph.num_poses(); ++pose) {
-    evaluate.parameter_blocks.push_back(state.poses.row(pose).data());
-    information.block_sizes.push_back(graph.tangent_size());
-  }
-  for (int object = 0; object < graph.num_objects(); ++object) {
-    evaluate.parameter_blocks.push_back(state.landmarks.row(object).data());
-    information.block_sizes.push_back(kLandmarkSize);
-  }
-  ceres::CRSMatrix crs;
-  std::vector<double> residuals;
-  double cost = 0;
-  if (!problem.Evaluate(evaluate, &cost, &residuals, nullptr, &crs)) {
-    throw std::runtime_error("covariance: a residual is undefined at this state");
-  }
-  information.residuals =
-      Eigen::Map<const Eigen::VectorXd>(residuals.data(), static_cast<int>(residuals.size()));
-  information.jacobian = Eigen::Map<const Eigen::SparseMatrix<double, Eigen::RowMajor>>(
-      crs.num_rows,
-      crs.num_cols,
-      static_cast<int>(crs.values.size()),
-      crs.rows.data(),
-      crs.cols.data(),
-      crs.values.data());
+  information.first_free_pose = terms.variables.first_free_pose;
+  information.num_free_poses = terms.variables.num_free_poses();
+  information.num_boxes = static_cast<int>(terms.boxes.size());
+  information.block_sizes = terms.variables.BlockSizes();
+  const bool defined =
+      Dispatch(graph.pose_model, options.landmark_model, [&](auto pose, auto landmark) {
+        JacobianRows<decltype(pose), decltype(landmark)> rows(
+            prepared, options, terms.variables, state);
+        if (!VisitTerms<decltype(pose), decltype(landmark)>(prepared, terms, &rows)) return false;
+        rows.MoveTo(&information);
+        return true;
+      });
+  if (!defined) throw std::runtime_error("covariance: a residual is undefined at this state");
   information.matrix = Sparse(information.jacobian.transpose()) * information.jacobian;
   return information;
 }

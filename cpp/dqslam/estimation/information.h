@@ -2,7 +2,6 @@
 #pragma once
 
 #include <Eigen/SparseCore>
-#include <string>
 #include <vector>
 
 #include "dqslam/solver/stage.h"
@@ -23,14 +22,12 @@ struct Information {
   /// Column at which the block of a free pose or of an object starts.
   int PoseColumn(int pose) const;
   int ObjectColumn(int object) const;
-  /// "pose 3" or "object 0", as rows of the graph.
-  std::string NameOf(int block) const;
 };
 
 /// With a robust loss, boxes that are outliers at the state take no part.  Throws
 /// std::invalid_argument for a state that does not fit the graph and std::runtime_error where a
 /// residual of the last stage is undefined at it.
-Information ComputeInformation(const Graph& graph, const SolveOptions& options, State state);
+Information ComputeInformation(const Graph& graph, const SolveOptions& options, const State& state);
 
 /// H with a trillionth of its diagonal added, which keeps a factorization alive on
 /// directions that nothing determines.

@@ -83,12 +83,43 @@ inline void IgnoreBeyond(const EdgeFlags& one_sided,
   }
 }
 
+/// Error of each edge of an observed box: of the exact box where `depth` is 0, of the tangents at
+/// that depth else; with derivatives where kDerivatives.  False where it is undefined.
+template <bool kDerivatives>
+bool EdgeErrors(const Surface<double>& in_camera,
+                const Camera& camera,
+                const Eigen::Vector4d& observed,
+                double depth,
+                const EdgeFlags& one_sided,
+                Eigen::Vector4d* error,
+                EdgeDerivatives* edges) {
+  const bool is_box = depth == 0;
+  bool defined = false;
+  if constexpr (kDerivatives) {
+    defined = is_box ? DifferentiateBox(in_camera, camera, error, edges)
+                     : DifferentiateTangents(in_camera, camera, observed, depth, error, edges);
+  } else {
+    defined = is_box ? ProjectToBox(in_camera, camera, error)
+                     : TangentDistances(in_camera, camera, observed, depth, error);
+  }
+  if (!defined) return false;
+  if (is_box) *error -= observed;
+  const auto& outward = is_box ? kBoxOutward : kTangentOutward;
+  if constexpr (kDerivatives) {
+    IgnoreBeyond(one_sided, outward, error, edges);
+  } else {
+    IgnoreBeyond(one_sided, error, outward);
+  }
+  return true;
+}
+
 /// A pose of the robot and its camera, as the derivatives need them.
 struct Station {
   template <typename Pose>
   static Station At(const double* pose, const Mount& mount) {
-    return {Pose::template WorldFromRobot<double>(pose), LocateCamera<Pose>(pose, mount)};
+    return {pose, Pose::template WorldFromRobot<double>(pose), LocateCamera<Pose>(pose, mount)};
   }
+  const double* pose;  ///< parameters, which must outlive this
   Rigid<double> world_from_robot;
   CameraInWorld<double> camera;
 };
@@ -112,20 +143,6 @@ struct Unpacked<EllipsoidModel> {
   }
   Surface<double> surface;
   Matrix3<double> factor;  ///< L
-};
-
-template <>
-struct Unpacked<DualQuadricModel> {
-  explicit Unpacked(const double* q) : surface(DualQuadricModel::Unpack(q)) {}
-  Vector9d Gradient(const Eigen::Vector3d& m, double by_center, double by_shape) const {
-    const Eigen::Vector3d c = (by_center + 2 * by_shape * m.dot(surface.center)) * m;
-    const Eigen::Vector3d b = -by_shape * m;
-    Vector9d gradient;
-    gradient << b[0] * m[0], 2 * b[0] * m[1], 2 * b[0] * m[2], c[0], b[1] * m[1], 2 * b[1] * m[2],
-        c[1], b[2] * m[2], c[2];
-    return gradient;
-  }
-  Surface<double> surface;
 };
 
 /// From the edges' own derivatives to those by the tangent of the pose and by the landmark.

@@ -6,13 +6,20 @@
 namespace dqslam::online {
 namespace {
 
+// EllipsoidFromCenterShape() as a functor.
+struct ToEllipsoid {
+  static constexpr int kResidualSize = kLandmarkSize;
+  template <typename T>
+  bool operator()(const T* center_shape, T* ellipsoid) const {
+    EllipsoidFromCenterShape(center_shape, ellipsoid);
+    return true;
+  }
+};
+
 // d log-Cholesky / d center_shape.
 Matrix9d JacobianOfEllipsoid(const Vector9d& center_shape, Vector9d* ellipsoid) {
-  ceres::Jet<double, 9> in[9], out[9];
-  PlainJets<9>(center_shape.data(), 0, in);
-  EllipsoidFromCenterShape(in, out);
   Matrix9d jacobian;
-  SplitJets(out, ellipsoid, &jacobian);
+  Differentiate(ToEllipsoid(), ellipsoid, &jacobian, ObjectParameters{center_shape.data()});
   return jacobian;
 }
 

@@ -4,36 +4,73 @@
 
 #include <ceres/jet.h>
 
+#include <array>
+#include <tuple>
+
 #include "dqslam/geometry/blocks.h"
 #include "dqslam/geometry/pose.h"
 
 namespace dqslam {
 
-/// The parameters of a pose as jets: derivative columns from `column` on are its tangent.
-template <typename Pose, int N>
-void PoseJets(const double* pose, int column, ceres::Jet<double, N>* jets) {
-  using Jet = ceres::Jet<double, N>;
-  Jet origin[Pose::kSize], tangent[Pose::kTangentSize];
-  for (int i = 0; i < Pose::kSize; ++i) origin[i] = Jet(pose[i]);
-  for (int i = 0; i < Pose::kTangentSize; ++i) tangent[i] = Jet(0.0, column + i);
-  Plus<Pose>(origin, tangent, jets);
-}
+/// The parameters of a pose; as jets they move along its tangent.
+template <typename Pose>
+struct PoseParameters {
+  static constexpr int kSize = Pose::kSize;
+  static constexpr int kTangentSize = Pose::kTangentSize;
+  const double* values;
 
-/// Parameters that are their own tangent.
-template <int kSize, int N>
-void PlainJets(const double* values, int column, ceres::Jet<double, N>* jets) {
-  for (int i = 0; i < kSize; ++i) jets[i] = ceres::Jet<double, N>(values[i], column + i);
-}
+  /// Derivative columns from `column` on are those of the tangent.
+  template <typename Jet>
+  std::array<Jet, kSize> Jets(int column) const {
+    std::array<Jet, kSize> origin, moved;
+    std::array<Jet, kTangentSize> tangent;
+    for (int i = 0; i < kSize; ++i) origin[i] = Jet(values[i]);
+    for (int i = 0; i < kTangentSize; ++i) tangent[i] = Jet(0.0, column + i);
+    Plus<Pose>(origin.data(), tangent.data(), moved.data());
+    return moved;
+  }
+};
 
-/// Splits jets of residuals.
-template <int kResiduals, int N>
-void SplitJets(const ceres::Jet<double, N>* jets,
-               Eigen::Matrix<double, kResiduals, 1>* residual,
-               Eigen::Matrix<double, kResiduals, N>* jacobian) {
-  for (int i = 0; i < kResiduals; ++i) {
+/// The parameters of an object, which are their own tangent.
+struct ObjectParameters {
+  static constexpr int kSize = kLandmarkSize;
+  static constexpr int kTangentSize = kLandmarkSize;
+  const double* values;
+
+  template <typename Jet>
+  std::array<Jet, kSize> Jets(int column) const {
+    std::array<Jet, kSize> jets;
+    for (int i = 0; i < kSize; ++i) jets[i] = Jet(values[i], column + i);
+    return jets;
+  }
+};
+
+/// Residual of a cost and its Jacobian by the tangents of its blocks, side by side in their order;
+/// false where the cost fails.
+template <typename Cost, int kColumns, typename... Parameters>
+bool Differentiate(const Cost& cost,
+                   Eigen::Matrix<double, Cost::kResidualSize, 1>* residual,
+                   Eigen::Matrix<double, Cost::kResidualSize, kColumns>* jacobian,
+                   const Parameters&... blocks) {
+  static_assert(kColumns == (Parameters::kTangentSize + ...));
+  using Jet = ceres::Jet<double, kColumns>;
+  int column = 0;
+  const auto jets_of = [&column](const auto& block) {
+    const int first = column;
+    column += block.kTangentSize;
+    return block.template Jets<Jet>(first);
+  };
+  // Braces: the blocks are taken in their order.
+  const std::tuple<std::array<Jet, Parameters::kSize>...> parameters{jets_of(blocks)...};
+  std::array<Jet, Cost::kResidualSize> jets;
+  const bool defined = std::apply(
+      [&](const auto&... block) { return cost(block.data()..., jets.data()); }, parameters);
+  if (!defined) return false;
+  for (int i = 0; i < Cost::kResidualSize; ++i) {
     (*residual)[i] = jets[i].a;
     jacobian->row(i) = jets[i].v.transpose();
   }
+  return true;
 }
 
 }  // namespace dqslam

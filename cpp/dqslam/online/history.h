@@ -17,6 +17,7 @@ struct Observation {
   Eigen::Matrix4d sqrt_information;  ///< whitens the error; of a center, zero in the last row
   EdgeFlags truncated = EdgeFlags::Constant(false);
   bool is_box = true;
+  int kind = 0;  ///< of a measurement that is no box, see costs/measurements.h
 
   bool Waits() const { return object < 0; }
 };

@@ -57,7 +57,7 @@ double CostAt(const Model& model,
   for (size_t i = 0; i < object.observations.size(); ++i) {
     const Observation& observation = history.observations[object.observations[i]];
     const Station station = Station::At<Pose>(history.poses[observation.pose].data(), model.mount);
-    cost += CostOfObservation(model, station, observation, center_shape, depths[i], &unused);
+    cost += CostOfObservation<Pose>(model, station, observation, center_shape, depths[i], &unused);
   }
   return cost;
 }

@@ -3,14 +3,19 @@
 #include <cmath>
 #include <limits>
 
-#include "dqslam/costs/odometry.h"
-#include "dqslam/costs/scene_priors.h"
-#include "dqslam/costs/size_prior.h"
 #include "dqslam/geometry/jets.h"
+#include "dqslam/solver/terms.h"
 
 namespace dqslam {
 
-struct CenterShapeModel;
+// A landmark model for costs of the center; a surface for ByPoseAndLandmark().
+struct CenterShapeModel {
+  template <typename T>
+  static Surface<T> Unpack(const T* center_shape) {
+    return {Vector3<T>(center_shape[0], center_shape[1], center_shape[2]),
+            online::ShapeOf(center_shape)};
+  }
+};
 
 // For ByPoseAndLandmark(): derivatives by the center_shape instead of a landmark's parameters.
 template <>
@@ -44,42 +49,31 @@ void Weigh(double loss_scale, double s, double* cost, double* loss) {
   *loss = 1 / std::sqrt(1 + s / c2);
 }
 
+// Edges of an observation that count on one side only: of the tangents (depth > 0) those that the
+// image cut, of a box also those that the object touches outside the image.
+EdgeFlags OneSided(const Camera& camera,
+                   const Observation& observation,
+                   const Surface<double>& in_camera,
+                   double depth) {
+  Vector4d predicted;
+  if (depth > 0 || !observation.truncated.any() || !ProjectToBox(in_camera, camera, &predicted)) {
+    return observation.truncated;
+  }
+  return OneSidedEdges(observation.truncated, camera, in_camera, predicted);
+}
+
 // Error by edge of the box's residual where `depth` is 0, else of the tangents', with derivatives
 // where they are asked for; false where it is undefined.
 template <bool kDerivatives>
-bool EdgeErrors(const Camera& camera,
-                const Observation& observation,
-                const Surface<double>& in_camera,
-                double depth,
-                Vector4d* error,
-                EdgeDerivatives* edges) {
-  if (depth == 0) {
-    Vector4d box;
-    if constexpr (kDerivatives) {
-      if (!DifferentiateBox(in_camera, camera, &box, edges)) return false;
-    } else {
-      if (!ProjectToBox(in_camera, camera, &box)) return false;
-    }
-    *error = box - observation.value;
-    if (!observation.truncated.any()) return true;
-    IgnoreBeyond(OneSidedEdges(observation.truncated, camera, in_camera, box), error);
-  } else {
-    if constexpr (kDerivatives) {
-      if (!DifferentiateTangents(in_camera, camera, observation.value, depth, error, edges))
-        return false;
-    } else {
-      if (!TangentDistances(in_camera, camera, observation.value, depth, error)) return false;
-    }
-    if (!observation.truncated.any()) return true;
-    IgnoreBeyond(observation.truncated, error, kTangentOutward);
-  }
-  if constexpr (kDerivatives) {
-    // Ignored.
-    for (int edge = 0; edge < kBoxSize; ++edge) {
-      if ((*error)[edge] == 0) edges->by_center[edge] = edges->by_shape[edge] = 0;
-    }
-  }
-  return true;
+bool ErrorsOf(const Camera& camera,
+              const Observation& observation,
+              const Surface<double>& in_camera,
+              double depth,
+              Vector4d* error,
+              EdgeDerivatives* edges) {
+  const EdgeFlags one_sided = OneSided(camera, observation, in_camera, depth);
+  return EdgeErrors<kDerivatives>(
+      in_camera, camera, observation.value, depth, one_sided, error, edges);
 }
 
 // Returns the error by edge, and fills all of `linear` that the loss has no part in.
@@ -95,9 +89,9 @@ Vector4d LinearizeBox(const Model& model,
   EdgeDerivatives edges;
   linear->depth = 0;
   if (residual == Edges::kTangent ||
-      !EdgeErrors<true>(model.camera, observation, in_camera, 0, &error, &edges)) {
+      !ErrorsOf<true>(model.camera, observation, in_camera, 0, &error, &edges)) {
     linear->depth = TangentDepth(in_camera);
-    if (!EdgeErrors<true>(model.camera, observation, in_camera, linear->depth, &error, &edges)) {
+    if (!ErrorsOf<true>(model.camera, observation, in_camera, linear->depth, &error, &edges)) {
       // A shape that rounding has flattened: CostOfObservation() is infinite there.
       linear->by_pose.setZero();
       linear->by_object.setZero();
@@ -109,65 +103,73 @@ Vector4d LinearizeBox(const Model& model,
   return error;
 }
 
-// r = z - q, q = R^T (c - t).
-Vector4d PositionError(const Station& station,
-                       const Observation& observation,
-                       const Vector3d& center) {
-  const Rigid<double>& robot = station.world_from_robot;
-  Vector4d error = Vector4d::Zero();
-  error.head<3>() =
-      observation.value.head<3>() - robot.rotation.transpose() * (center - robot.translation);
-  return error;
+// Calls visit(cost) with the cost of a measurement that is no box, and returns what that returns.
+template <typename Pose, typename Visit>
+auto VisitMeasurement(const Observation& observation, Visit&& visit) {
+  return VisitMeasurementKind<Pose, CenterShapeModel>(observation.kind, [&](auto tag) {
+    using Cost = typename decltype(tag)::Cost;
+    constexpr int m = Cost::kResidualSize;
+    return visit(
+        Cost{{}, observation.value.head<m>(), observation.sqrt_information.topLeftCorner<m, m>()});
+  });
 }
 
+// Fills all of `linear`; where the measurement is undefined, CostOfObservation() is infinite.
 template <typename Pose>
-Vector4d LinearizePosition(const Station& station,
-                           const Observation& observation,
-                           const Vector3d& center,
-                           Linear<Pose>* linear) {
-  const Vector4d error = PositionError(station, observation, center);
-  const Eigen::Matrix3d& R = station.world_from_robot.rotation;
-  const Vector3d q = observation.value.head<3>() - error.head<3>();
+void LinearizeMeasurement(const Station& station,
+                          const Observation& observation,
+                          const Vector9d& center_shape,
+                          Linear<Pose>* linear) {
   linear->depth = 0;
+  linear->residual.setZero();
   linear->by_pose.setZero();
   linear->by_object.setZero();
-  for (int axis = 0; axis < 3; ++axis) {
-    const Vector3d unit = Vector3d::Unit(axis);
-    const Vector3d turn = q.cross(unit);
-    if constexpr (Pose::kModel == PoseModel::kSe2) {
-      linear->by_pose.row(axis) << unit.x(), unit.y(), turn.z();
-    } else {
-      linear->by_pose.row(axis) << unit.transpose(), turn.transpose();
+  VisitMeasurement<Pose>(observation, [&](const auto& cost) {
+    constexpr int k = Pose::kTangentSize, m = std::decay_t<decltype(cost)>::kResidualSize;
+    Eigen::Matrix<double, m, 1> residual;
+    Eigen::Matrix<double, m, k + kLandmarkSize> jacobian;
+    if (!Differentiate(cost,
+                       &residual,
+                       &jacobian,
+                       PoseParameters<Pose>{station.pose},
+                       ObjectParameters{center_shape.data()})) {
+      return;
     }
-  }
-  linear->by_object.template topLeftCorner<3, 3>() = -R.transpose();
-  return error;
+    linear->residual.template head<m>() = residual;
+    linear->by_pose.template topRows<m>() = jacobian.template leftCols<k>();
+    linear->by_object.template topRows<m>() = jacobian.template rightCols<kLandmarkSize>();
+  });
+  linear->chi_square = linear->residual.squaredNorm();
+  linear->cost = 0.5 * linear->chi_square;
 }
 
 }  // namespace
 
+template <typename Pose>
 double CostOfObservation(const Model& model,
                          const Station& station,
                          const Observation& observation,
                          const Vector9d& center_shape,
                          double depth,
                          double* chi_square) {
-  const Surface<double> object = SurfaceOf(center_shape);
-  Vector4d error;
   *chi_square = std::numeric_limits<double>::infinity();
   if (!observation.is_box) {
-    error = PositionError(station, observation, object.center);
-  } else if (!EdgeErrors<false>(model.camera,
-                                observation,
-                                ToCamera(station.camera, object),
-                                depth,
-                                &error,
-                                nullptr)) {
+    const bool defined = VisitMeasurement<Pose>(observation, [&](const auto& cost) {
+      Eigen::Matrix<double, std::decay_t<decltype(cost)>::kResidualSize, 1> residual;
+      if (!cost(station.pose, center_shape.data(), residual.data())) return false;
+      *chi_square = residual.squaredNorm();
+      return true;
+    });
+    return defined ? 0.5 * *chi_square : *chi_square;
+  }
+  Vector4d error;
+  const Surface<double> in_camera = ToCamera(station.camera, SurfaceOf(center_shape));
+  if (!ErrorsOf<false>(model.camera, observation, in_camera, depth, &error, nullptr)) {
     return *chi_square;
   }
   *chi_square = (observation.sqrt_information * error).squaredNorm();
   double cost, loss;
-  Weigh(observation.is_box ? model.loss_scale : 0, *chi_square, &cost, &loss);
+  Weigh(model.loss_scale, *chi_square, &cost, &loss);
   return cost;
 }
 
@@ -178,15 +180,16 @@ void Linearize(const Model& model,
                const Vector9d& center_shape,
                Edges edges,
                Linear<Pose>* linear) {
+  if (!observation.is_box) {
+    LinearizeMeasurement(station, observation, center_shape, linear);
+    return;
+  }
   const Unpacked<CenterShapeModel> object(center_shape);
   const Eigen::Matrix4d& W = observation.sqrt_information;
-  linear->residual =
-      W * (observation.is_box
-               ? LinearizeBox(model, station, observation, object, edges, linear)
-               : LinearizePosition(station, observation, object.surface.center, linear));
+  linear->residual = W * LinearizeBox(model, station, observation, object, edges, linear);
   linear->chi_square = linear->residual.squaredNorm();
   double loss;
-  Weigh(observation.is_box ? model.loss_scale : 0, linear->chi_square, &linear->cost, &loss);
+  Weigh(model.loss_scale, linear->chi_square, &linear->cost, &loss);
   linear->residual *= loss;
   const Eigen::Matrix4d weight = loss * W;
   linear->by_pose = weight * linear->by_pose.eval();
@@ -198,15 +201,13 @@ LinearStep<Pose> LinearizeStep(const typename History<Pose>::Step& step,
                                const double* from,
                                const double* to) {
   constexpr int k = Pose::kTangentSize;
-  using Jet = ceres::Jet<double, 2 * k>;
-  Jet moved_from[Pose::kSize], moved_to[Pose::kSize], residual[k];
-  PoseJets<Pose>(from, 0, moved_from);
-  PoseJets<Pose>(to, k, moved_to);
-  const OdometryCost<Pose> cost{{}, step.relative, step.sqrt_information};
-  cost(moved_from, moved_to, residual);
   LinearStep<Pose> linear;
   Eigen::Matrix<double, k, 2 * k> jacobian;
-  SplitJets(residual, &linear.residual, &jacobian);
+  Differentiate(OdometryCost<Pose>{{}, step.relative, step.sqrt_information},
+                &linear.residual,
+                &jacobian,
+                PoseParameters<Pose>{from},
+                PoseParameters<Pose>{to});
   linear.by_from = jacobian.template leftCols<k>();
   linear.by_to = jacobian.template rightCols<k>();
   return linear;
@@ -222,24 +223,27 @@ double CostOfStep(const typename History<Pose>::Step& step, const double* from, 
 
 namespace {
 
-// Calls add(residuals, count) for every prior, on the scalar of the center_shape.
-template <typename T, typename Add>
-bool ForPriors(const Model& model, const Object& object, const T* center_shape, Add&& add) {
-  T ellipsoid[9], residual[6];
-  EllipsoidFromCenterShape(center_shape, ellipsoid);
-  const SizePriorCost size{{}, object.size.log_mean, object.size.log_sigma};
-  if (!size(ellipsoid, residual)) return false;
-  add(residual, 6);
-  const ScenePriors& scene = model.scene;
-  if (scene.upright_sigma > 0) {
-    UprightCost{{}, scene.up, scene.upright_sigma}(ellipsoid, residual);
-    add(residual, 3);
+// A prior on an ellipsoid as a cost of its center and shape.
+template <typename Prior>
+struct OfCenterShape {
+  static constexpr int kResidualSize = Prior::kResidualSize;
+  const Prior& prior;
+
+  template <typename T>
+  bool operator()(const T* center_shape, T* residual) const {
+    T ellipsoid[kLandmarkSize];
+    EllipsoidFromCenterShape(center_shape, ellipsoid);
+    return prior(ellipsoid, residual);
   }
-  if (scene.support_sigma > 0) {
-    SupportPlaneCost{{}, scene.up, scene.plane_offset, scene.support_sigma}(ellipsoid, residual);
-    add(residual, 1);
-  }
-  return true;
+};
+
+// Calls visit(cost) with each prior of an object; false where a call returns false.
+template <typename Visit>
+bool VisitPriors(const Model& model, const Object& object, Visit&& visit) {
+  return VisitObjectPriors(
+      object.size.log_mean, object.size.log_sigma, model.scene, [&](const auto& prior) {
+        return visit(OfCenterShape<std::decay_t<decltype(prior)>>{prior});
+      });
 }
 
 }  // namespace
@@ -248,16 +252,17 @@ double AddPriors(const Model& model,
                  const Object& object,
                  const Vector9d& center_shape,
                  GaussianPrior* sum) {
-  using Jet = ceres::Jet<double, 9>;
-  Jet at[9];
-  PlainJets<9>(center_shape.data(), 0, at);
   double cost = CostOf(object.map, center_shape);
-  const bool defined = ForPriors(model, object, at, [&](const Jet* residual, int count) {
-    for (int i = 0; i < count; ++i) {
-      sum->H.noalias() += residual[i].v * residual[i].v.transpose();
-      sum->g += residual[i].v * residual[i].a;
-      cost += 0.5 * residual[i].a * residual[i].a;
-    }
+  const bool defined = VisitPriors(model, object, [&](const auto& prior) {
+    constexpr int m = std::decay_t<decltype(prior)>::kResidualSize;
+    Eigen::Matrix<double, m, 1> residual;
+    Eigen::Matrix<double, m, kLandmarkSize> jacobian;
+    const ObjectParameters parameters{center_shape.data()};
+    if (!Differentiate(prior, &residual, &jacobian, parameters)) return false;
+    sum->H.noalias() += jacobian.transpose() * jacobian;
+    sum->g.noalias() += jacobian.transpose() * residual;
+    cost += 0.5 * residual.squaredNorm();
+    return true;
   });
   sum->H += object.map.H;
   sum->g += GradientOf(object.map, center_shape);
@@ -266,10 +271,12 @@ double AddPriors(const Model& model,
 
 double CostOfPriors(const Model& model, const Object& object, const Vector9d& center_shape) {
   double cost = CostOf(object.map, center_shape);
-  const auto add = [&](const double* residual, int count) {
-    for (int i = 0; i < count; ++i) cost += 0.5 * residual[i] * residual[i];
-  };
-  const bool defined = ForPriors(model, object, center_shape.data(), add);
+  const bool defined = VisitPriors(model, object, [&](const auto& prior) {
+    Eigen::Matrix<double, std::decay_t<decltype(prior)>::kResidualSize, 1> residual;
+    if (!prior(center_shape.data(), residual.data())) return false;
+    cost += 0.5 * residual.squaredNorm();
+    return true;
+  });
   return defined ? cost : std::numeric_limits<double>::infinity();
 }
 
@@ -277,21 +284,19 @@ template <typename Pose>
 double LinearizeHeight(const Model& model,
                        const double* pose,
                        Eigen::Matrix<double, Pose::kTangentSize, 1>* jacobian) {
-  const ScenePriors& scene = model.scene;
-  ceres::Jet<double, Pose::kTangentSize> moved[Pose::kSize], residual;
-  PoseJets<Pose>(pose, 0, moved);
-  const CameraHeightCost<Pose> cost{{},
-                                    model.mount,
-                                    scene.up,
-                                    scene.plane_offset,
-                                    scene.camera_height,
-                                    scene.camera_height_sigma};
-  cost(moved, &residual);
-  *jacobian = residual.v;
-  return residual.a;
+  Eigen::Matrix<double, 1, 1> residual = Eigen::Matrix<double, 1, 1>::Zero();
+  VisitPosePriors<Pose>(model.mount, model.scene, [&](const auto& cost) {
+    Eigen::Matrix<double, 1, Pose::kTangentSize> row;
+    const bool defined = Differentiate(cost, &residual, &row, PoseParameters<Pose>{pose});
+    *jacobian = row.transpose();
+    return defined;
+  });
+  return residual[0];
 }
 
 #define DQSLAM_INSTANTIATE(Pose)                                                                \
+  template double CostOfObservation<Pose>(                                                      \
+      const Model&, const Station&, const Observation&, const Vector9d&, double, double*);      \
   template void Linearize<Pose>(                                                                \
       const Model&, const Station&, const Observation&, const Vector9d&, Edges, Linear<Pose>*); \
   template LinearStep<Pose> LinearizeStep<Pose>(                                                \

@@ -34,6 +34,7 @@ struct Linear {
 /// Cost of a observation after the loss, and its chi-square before; with the residual that
 /// Linearize() used, of that depth.  Infinite where it is the box's and the object is not strictly
 /// in front.
+template <typename Pose>
 double CostOfObservation(const Model& model,
                          const Station& station,
                          const Observation& observation,

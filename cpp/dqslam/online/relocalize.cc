@@ -222,7 +222,7 @@ class Search {
     const Station station = Station::At<Pose>(pose.data(), model_.mount);
     double cost = 0, unused;
     for (size_t i = 0; i < observations.size(); ++i) {
-      cost += CostOfObservation(
+      cost += CostOfObservation<Pose>(
           model_, station, observations[i], charts_[place.matches[i].second], depths[i], &unused);
     }
     return std::isfinite(cost) ? cost : std::numeric_limits<double>::infinity();
@@ -236,7 +236,7 @@ class Search {
       for (const int object : view_.candidates[box]) {
         const Match match(box, object);
         double chi_square;
-        CostOfObservation(
+        CostOfObservation<Pose>(
             model_, station, Blurred(station, match), charts_[object], 0, &chi_square);
         if (chi_square <= kGate) pairs.push_back({chi_square, match});
       }

@@ -59,10 +59,11 @@ Graph ToGraph(const Model& model, const History<Pose>& history, std::vector<int>
                  RowMatrix(boxes, kBoxSize),
                  RowMatrix(boxes, 16),
                  BoolTable(boxes, kBoxSize)};
-  graph.positions = {IndexVector(positions),
-                     IndexVector(positions),
-                     RowMatrix(positions, 3),
-                     RowMatrix(positions, 9)};
+  graph.measurements = {{"position",
+                         IndexVector(positions),
+                         IndexVector(positions),
+                         RowMatrix(positions, 3),
+                         RowMatrix(positions, 9)}};
   boxes = positions = 0;
   for (const Observation& observation : history.observations) {
     if (!takes_part(observation)) continue;
@@ -79,10 +80,10 @@ Graph ToGraph(const Model& model, const History<Pose>& history, std::vector<int>
     } else {
       const Eigen::Matrix3d W = observation.sqrt_information.topLeftCorner<3, 3>();
       const Eigen::Matrix3d covariance = (W.transpose() * W).inverse();
-      graph.positions.pose[positions] = observation.pose;
-      graph.positions.object[positions] = object;
-      graph.positions.object_in_robot.row(positions) = observation.value.head<3>().transpose();
-      graph.positions.covariance.row(positions++) =
+      graph.measurements[0].pose[positions] = observation.pose;
+      graph.measurements[0].object[positions] = object;
+      graph.measurements[0].value.row(positions) = observation.value.head<3>().transpose();
+      graph.measurements[0].covariance.row(positions++) =
           Eigen::Map<const Eigen::Matrix<double, 1, 9>>(covariance.data());
     }
   }

@@ -250,7 +250,7 @@ void Window<Pose>::FitTrial(const History<Pose>& history) {
       double chi_square;
       there_.chi_square +=
           2 *
-          CostOfObservation(
+          CostOfObservation<Pose>(
               model_, station, observation, locals_[local].trial, depth_[row - first], &chi_square);
       there_.of_object[local] += chi_square;
       if (!std::isfinite(chi_square)) {

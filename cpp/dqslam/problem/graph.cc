@@ -5,6 +5,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "dqslam/costs/measurements.h"
 #include "dqslam/costs/whitening.h"
 
 namespace dqslam {
@@ -113,6 +114,25 @@ void ValidateBoxes(const Graph& graph) {
   }
 }
 
+void ValidateMeasurements(const Graph& graph, const MeasurementTable& table) {
+  const int kind = MeasurementKind(table.kind);
+  if (kind < 0) {
+    throw std::invalid_argument("measurements: there is no kind '" + table.kind + "'");
+  }
+  const int m = MeasurementSize(kind);
+  CheckIds(table.kind + "_pose", table.pose, table.size(), graph.num_poses());
+  CheckIds(table.kind + "_object", table.object, table.size(), graph.num_objects());
+  CheckShape(table.kind + "_value", table.value, table.size(), m);
+  CheckShape(table.kind + "_covariance", table.covariance, table.size(), m * m);
+  for (int row = 0; row < table.size(); ++row) {
+    try {
+      MeasurementSqrtInformation(kind, table.covariance.row(row).data());
+    } catch (const std::invalid_argument& error) {
+      Fail(table.kind + "_covariance", row, error.what());
+    }
+  }
+}
+
 void ValidateScenePriors(const ScenePriors& priors) {
   const Eigen::Vector4d numbers(
       priors.plane_offset, priors.upright_sigma, priors.support_sigma, priors.camera_height_sigma);
@@ -143,13 +163,7 @@ void Validate(const Graph& graph, bool poses_known) {
   ValidateOdometry(graph, poses_known);
   ValidateBoxes(graph);
   ValidateScenePriors(graph.scene_priors);
-
-  const PositionTable& positions = graph.positions;
-  CheckIds("position_pose", positions.pose, positions.size(), graph.num_poses());
-  CheckIds("position_object", positions.object, positions.size(), graph.num_objects());
-  CheckShape("positions", positions.object_in_robot, positions.size(), 3);
-  CheckShape("position_covariance", positions.covariance, positions.size(), 9);
-  CheckCovariance<3>("position_covariance", positions.covariance);
+  for (const MeasurementTable& table : graph.measurements) ValidateMeasurements(graph, table);
 }
 
 void Append(const Summary& stage, Summary* total) {

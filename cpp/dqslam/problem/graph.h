@@ -27,11 +27,12 @@ struct BoxTable {
   int size() const { return static_cast<int>(pose.size()); }
 };
 
-/// Measured positions of object centers in the robot frame, [S&M17] eq. (8).
-struct PositionTable {
+/// Measurements of one kind between poses and objects, beside boxes: m numbers each.
+struct MeasurementTable {
+  std::string kind;  ///< "position" or "range": the costs of costs/measurements.h
   IndexVector pose, object;
-  RowMatrix object_in_robot;  ///< (n, 3) meters
-  RowMatrix covariance;       ///< (n, 9) meters^2
+  RowMatrix value;       ///< (n, m); of positions object_in_robot, meters, [S&M17] eq. (8)
+  RowMatrix covariance;  ///< (n, m * m)
   int size() const { return static_cast<int>(pose.size()); }
 };
 
@@ -56,7 +57,7 @@ struct Graph {
   RowMatrix initial_poses;  ///< (poses, d): dead reckoning, or the known poses when mapping
   OdometryTable odometry;
   BoxTable boxes;
-  PositionTable positions;
+  std::vector<MeasurementTable> measurements;
   SizePriorTable size_prior;
   ScenePriors scene_priors;
 

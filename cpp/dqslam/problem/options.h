@@ -45,8 +45,10 @@ enum class Minimizer { kLevenbergMarquardt, kDogleg };
 
 /// Who carries out the steps; the costs and the methods are the same.
 enum class Backend {
-  kNative,  ///< normal equations in blocks, boxes differentiated by hand
-  kCeres,   ///< ceres::Solve on AutoDiff cost functions: slower, a second opinion
+  /// Normal equations in blocks, boxes differentiated by hand.  Stages with an algebraic residual,
+  /// with dual quadrics or with switchable constraints go through Ceres all the same.
+  kNative,
+  kCeres,  ///< ceres::Solve on AutoDiff cost functions: slower, a second opinion
 };
 
 struct SolveOptions {

@@ -1,7 +1,9 @@
 #include "dqslam/problem/prepared.h"
 
 #include <algorithm>
+#include <utility>
 
+#include "dqslam/costs/measurements.h"
 #include "dqslam/costs/whitening.h"
 
 namespace dqslam {
@@ -33,7 +35,17 @@ PreparedGraph::PreparedGraph(const Graph& graph, bool poses_known)
           ? SqrtInformationOfRows<3, Eigen::MatrixXd>(graph.odometry.covariance)
           : SqrtInformationOfRows<6, Eigen::MatrixXd>(graph.odometry.covariance);
   box_sqrt_information = SqrtInformationOfRows<4, Eigen::Matrix4d>(graph.boxes.covariance);
-  position_sqrt_information = SqrtInformationOfRows<3, Eigen::Matrix3d>(graph.positions.covariance);
+  for (const MeasurementTable& table : graph.measurements) {
+    const int kind = MeasurementKind(table.kind);
+    RowMatrix sqrt_information(table.size(), table.covariance.cols());
+    for (int row = 0; row < table.size(); ++row) {
+      sqrt_information.row(row) = MeasurementSqrtInformation(kind, table.covariance.row(row).data())
+                                      .reshaped<Eigen::RowMajor>()
+                                      .transpose();
+    }
+    measurement_kinds.push_back(kind);
+    measurement_sqrt_information.push_back(std::move(sqrt_information));
+  }
 
   boxes_of_object.resize(graph.num_objects());
   for (int row = 0; row < graph.boxes.size(); ++row) {

@@ -16,9 +16,10 @@ struct PreparedGraph {
   Mount mount;
   std::vector<Eigen::MatrixXd> odometry_sqrt_information;  ///< k x k, one an odometry row
   std::vector<Eigen::Matrix4d> box_sqrt_information;
-  std::vector<Eigen::Matrix3d> position_sqrt_information;
-  std::vector<std::vector<int>> boxes_of_object;  ///< box rows in the order of their poses
-  std::vector<int> odometry_into;                 ///< row that leads to each pose; -1: none
+  std::vector<int> measurement_kinds;                   ///< one a table, see costs/measurements.h
+  std::vector<RowMatrix> measurement_sqrt_information;  ///< one a table, m * m a row
+  std::vector<std::vector<int>> boxes_of_object;        ///< box rows in the order of their poses
+  std::vector<int> odometry_into;                       ///< row that leads to each pose; -1: none
 };
 
 /// Those of a box of the graph, see ellipsoid.h; where its object is not strictly in front, the

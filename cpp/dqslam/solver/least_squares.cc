@@ -5,10 +5,8 @@
 #include <utility>
 
 #include "dqslam/geometry/dispatch.h"
-#include "dqslam/solver/box_terms.h"
+#include "dqslam/solver/linearize.h"
 #include "dqslam/solver/loss.h"
-#include "dqslam/solver/other_terms.h"
-#include "dqslam/solver/packed_stage.h"
 #include "dqslam/solver/retraction.h"
 
 namespace dqslam {
@@ -16,53 +14,113 @@ namespace {
 
 using Eigen::VectorXd;
 
-template <typename Pose, typename Landmark>
+// A visitor of terms that lists the pairs of blocks that terms of two blocks couple.
+class PairCollector {
+ public:
+  PairCollector(const Graph& graph, const VariableIndex& variables)
+      : graph_(graph), variables_(variables) {}
+
+  template <typename Cost, typename... Rows>
+  bool Visit(const Cost&, const Rows&... rows) {
+    if constexpr (sizeof...(Rows) == 2) Add(BlockOf(rows)...);
+    return true;
+  }
+  bool VisitBox(const StageBox& box) {
+    Add(variables_.PoseBlock(graph_.boxes.pose[box.row]),
+        variables_.ObjectBlock(graph_.boxes.object[box.row]));
+    return true;
+  }
+
+  // One a term of two blocks; below zero: one of them is constant.
+  const std::vector<std::pair<int, int>>& all() const { return pairs_; }
+
+ private:
+  int BlockOf(PoseRow pose) const { return variables_.PoseBlock(pose.row); }
+  int BlockOf(ObjectRow object) const { return variables_.ObjectBlock(object.row); }
+  void Add(int a, int b) { pairs_.emplace_back(a, b); }
+
+  const Graph& graph_;
+  const VariableIndex& variables_;
+  std::vector<std::pair<int, int>> pairs_;
+};
+
+// The pattern of H, and which of its blocks off the diagonal each term of two blocks fills.
+struct Pattern {
+  BlockMatrix H;
+  std::vector<int> off_diagonal;
+};
+
+template <typename Pose>
+Pattern MakePattern(const PreparedGraph& prepared, const StageTerms& terms) {
+  PairCollector pairs(prepared.graph, terms.variables);
+  VisitTerms<Pose, EllipsoidModel>(prepared, terms, &pairs);
+  std::vector<std::pair<int, int>> coupled;
+  std::vector<int> off_diagonal;
+  for (const auto& [a, b] : pairs.all()) {
+    const bool is_constant = a < 0 || b < 0;
+    off_diagonal.push_back(is_constant ? -1 : static_cast<int>(coupled.size()));
+    if (!is_constant) coupled.emplace_back(a, b);
+  }
+  BlockMatrix H(terms.variables.BlockSizes(), coupled);
+  for (int& index : off_diagonal) {
+    if (index >= 0) index = H.index_of_pair(index);
+  }
+  return {std::move(H), std::move(off_diagonal)};
+}
+
+template <typename Pose>
 class StageProblem : public LeastSquares {
  public:
   StageProblem(const PreparedGraph& prepared,
-               const SolveOptions& options,
-               const Stage& stage,
-               StageLayout layout)
-      : LeastSquares(std::move(layout.H)),
-        loss_(MakeLoss(stage.loss, options)),
-        stage_{prepared, options, loss_.get(), std::move(layout.slots), std::move(layout.links)} {}
+               std::unique_ptr<ceres::LossFunction> loss,
+               StageTerms terms,
+               Pattern pattern)
+      : LeastSquares(std::move(pattern.H)),
+        prepared_(prepared),
+        loss_(std::move(loss)),
+        terms_(std::move(terms)),
+        off_diagonal_(std::move(pattern.off_diagonal)) {}
 
-  VectorXd Pack(const State& state) const override { return stage_.Pack(state); }
-  void Unpack(const VectorXd& values, State* state) const override { stage_.Unpack(values, state); }
+  VectorXd Pack(const State& state) const override { return terms_.variables.Pack(state); }
+  void Unpack(const VectorXd& values, State* state) const override {
+    terms_.variables.Unpack(values, state);
+  }
 
-  bool Plus(const VectorXd& values, const VectorXd& step, VectorXd* moved) const override {
-    return Retract<Pose, Landmark>(stage_, values, step, moved);
+  bool Retract(const VectorXd& values, const VectorXd& step, VectorXd* moved) const override {
+    return dqslam::Retract<Pose>(terms_.variables, values, step, moved);
   }
   bool RetractAlongPath(const VectorXd& values,
                         const VectorXd& step,
                         VectorXd* moved) const override {
-    return dqslam::RetractAlongPath<Pose, Landmark>(stage_, values, step, moved);
+    return dqslam::RetractAlongPath<Pose>(prepared_, terms_, values, step, moved);
   }
 
   bool Cost(const VectorXd& values, double* cost) const override {
-    return Visit<false>(values, nullptr, cost);
+    return Add<false>(values, nullptr, cost);
   }
 
   bool Linearize(const VectorXd& values) override {
     equations_.H.SetZero();
     equations_.gradient.setZero(equations_.H.rows());
     Accumulator accumulator(&equations_);
-    return Visit<true>(values, &accumulator, &equations_.cost);
+    return Add<true>(values, &accumulator, &equations_.cost);
   }
 
  private:
   // One pass over all terms; false where one is undefined.
   template <bool kDerivatives>
-  bool Visit(const VectorXd& values, Accumulator* equations, double* cost) const {
-    OtherTerms<Pose, Landmark, kDerivatives> others(stage_, values, equations);
-    BoxTerms<Pose, Landmark, kDerivatives> boxes(stage_, values, equations);
-    const bool defined = others.Add() && boxes.Add();
-    *cost = others.cost() + boxes.cost();
+  bool Add(const VectorXd& values, Accumulator* equations, double* cost) const {
+    Linearizer<Pose, kDerivatives> linearizer(
+        prepared_, terms_, loss_.get(), off_diagonal_, values, equations);
+    const bool defined = VisitTerms<Pose, EllipsoidModel>(prepared_, terms_, &linearizer);
+    *cost = linearizer.cost();
     return defined && std::isfinite(*cost);
   }
 
+  const PreparedGraph& prepared_;
   const std::unique_ptr<ceres::LossFunction> loss_;
-  PackedStage<Pose> stage_;
+  const StageTerms terms_;
+  const std::vector<int> off_diagonal_;
 };
 
 }  // namespace
@@ -71,13 +129,13 @@ std::unique_ptr<LeastSquares> MakeLeastSquares(const PreparedGraph& prepared,
                                                const SolveOptions& options,
                                                const Stage& stage,
                                                const State& state) {
-  StageLayout layout = MakeStageLayout(prepared, options, stage, state);
-  return Dispatch(prepared.graph.pose_model,
-                  options.landmark_model,
-                  [&](auto pose, auto landmark) -> std::unique_ptr<LeastSquares> {
-                    return std::make_unique<StageProblem<decltype(pose), decltype(landmark)>>(
-                        prepared, options, stage, std::move(layout));
-                  });
+  StageTerms terms = SelectTerms(prepared, options, stage, state);
+  return Dispatch(prepared.graph.pose_model, [&](auto pose) -> std::unique_ptr<LeastSquares> {
+    using Pose = decltype(pose);
+    Pattern pattern = MakePattern<Pose>(prepared, terms);
+    return std::make_unique<StageProblem<Pose>>(
+        prepared, MakeLoss(stage.loss, options), std::move(terms), std::move(pattern));
+  });
 }
 
 }  // namespace dqslam

@@ -19,9 +19,9 @@ class LeastSquares {
   virtual void Unpack(const Eigen::VectorXd& values, State* state) const = 0;
 
   /// Moved by a step in the tangents of the variables; false where that is impossible.
-  virtual bool Plus(const Eigen::VectorXd& values,
-                    const Eigen::VectorXd& step,
-                    Eigen::VectorXd* moved) const = 0;
+  virtual bool Retract(const Eigen::VectorXd& values,
+                       const Eigen::VectorXd& step,
+                       Eigen::VectorXd* moved) const = 0;
   /// The same to first order, but along the path (path_step.h); false where that is impossible.
   virtual bool RetractAlongPath(const Eigen::VectorXd& values,
                                 const Eigen::VectorXd& step,

@@ -1,4 +1,4 @@
-// Robust losses on whole boxes, beside those that Ceres brings, and switchable constraints.
+// Robust losses on whole boxes, beside those that Ceres brings.
 //   s    squared norm of a box's residual: chi-square with 4 degrees of freedom for a right box
 //   phi  the chi-square from which on a box is doubted
 #pragma once
@@ -7,7 +7,6 @@
 
 #include <memory>
 
-#include "dqslam/costs/autodiff_cost.h"
 #include "dqslam/problem/options.h"
 
 namespace dqslam {
@@ -52,22 +51,5 @@ inline std::unique_ptr<ceres::LossFunction> MakeLoss(Loss loss, const SolveOptio
   }
   return nullptr;
 }
-
-/// Switchable constraints, Suenderhauf & Protzel 2012:  r = (w e, (1 - w) sqrt(phi)).
-/// Blocks: those of the box cost, and the switch [1].  Residual: [5].  Fails where the box cost
-/// does.
-template <typename Pose, typename BoxResidual>
-struct SwitchedCost : AutoDiffCost<SwitchedCost<Pose, BoxResidual>, 5, Pose::kSize, 9, 1> {
-  BoxResidual box;
-  double sqrt_phi;
-
-  template <typename T>
-  bool operator()(const T* pose, const T* landmark, const T* w, T* residual) const {
-    if (!box(pose, landmark, residual)) return false;
-    for (int edge = 0; edge < 4; ++edge) residual[edge] *= *w;
-    residual[4] = (T(1) - *w) * T(sqrt_phi);
-    return true;
-  }
-};
 
 }  // namespace dqslam

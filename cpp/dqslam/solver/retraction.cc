@@ -10,143 +10,112 @@ namespace {
 
 using Eigen::VectorXd;
 
-template <typename Pose, typename Landmark>
-class StageStep {
+// The values of a stage before and after a step.
+template <typename Pose>
+class Step {
  public:
-  StageStep(const PackedStage<Pose>& stage,
-            const VectorXd& values,
-            const VectorXd& step,
-            VectorXd* moved)
-      : stage_(stage), slots_(stage.slots), values_(values), step_(step), moved_(*moved) {
+  Step(const VariableIndex& variables,
+       const VectorXd& values,
+       const VectorXd& step,
+       VectorXd* moved)
+      : variables_(variables), values_(values), step_(step), moved_(*moved) {
     moved_ = values;
-    moved_.tail(slots_.num_switches) += step.tail(slots_.num_switches);
-  }
-
-  bool Straight() {
-    for (int pose = slots_.first_free_pose; pose < slots_.end_pose; ++pose) MovePose(pose);
-    for (int slot = 0; slot < slots_.num_objects(); ++slot) {
-      const double* tangent = &step_[stage_.TangentOfObject(slot)];
-      const int start = stage_.ObjectStart(slot);
-      if constexpr (Landmark::kModel == LandmarkModel::kEllipsoid) {
-        if (!EllipsoidManifold().Plus(&values_[start], tangent, &moved_[start])) return false;
-      } else {
-        moved_.template segment<kLandmarkSize>(start) += Eigen::Map<const Vector9d>(tangent);
-      }
-    }
-    return true;
-  }
-
-  bool AlongPath() {
-    if constexpr (Landmark::kModel == LandmarkModel::kEllipsoid) {
-      for (int pose = slots_.first_free_pose; pose < slots_.end_pose; ++pose) {
-        const int row = stage_.prepared.odometry_into[pose];
-        if (row < 0) {
-          MovePose(pose);
-          continue;
-        }
-        PlusBehind<Pose>(Moved(stage_.prepared.graph.odometry.from[row]),
-                         &values_[stage_.PoseStart(pose)],
-                         TangentOf(pose),
-                         &moved_[stage_.PoseStart(pose)]);
-      }
-      const std::vector<int> viewers = Viewers();
-      for (int slot = 0; slot < slots_.num_objects(); ++slot) {
-        const int start = stage_.ObjectStart(slot);
-        if (!PlusBeside<Pose>(Moved(viewers[slot]),
-                              &values_[start],
-                              &step_[stage_.TangentOfObject(slot)],
-                              &moved_[start])) {
-          return false;
-        }
-      }
-      return true;
-    }
-    return false;
-  }
-
- private:
-  const double* TangentOf(int pose) const {
-    static constexpr double kRest[Pose::kTangentSize] = {};
-    return pose < slots_.first_free_pose ? kRest : &step_[stage_.TangentOfPose(pose)];
   }
 
   void MovePose(int pose) {
-    const int start = stage_.PoseStart(pose);
-    Plus<Pose>(&values_[start], TangentOf(pose), &moved_[start]);
-    Pose::Normalize(&moved_[start]);
+    double* result = Reached(pose);
+    Plus<Pose>(&values_[variables_.PoseStart(pose)], TangentOf(pose), result);
+    Pose::Normalize(result);
   }
 
+  bool MoveObject(int slot) {
+    const int start = variables_.ObjectStart(slot);
+    return EllipsoidManifold().Plus(&values_[start], TangentOfObject(slot), &moved_[start]);
+  }
+
+  void MovePoseBehind(int previous, int pose) {
+    PlusBehind<Pose>(
+        Moved(previous), &values_[variables_.PoseStart(pose)], TangentOf(pose), Reached(pose));
+  }
+
+  bool MoveObjectBeside(int viewer, int slot) {
+    const int start = variables_.ObjectStart(slot);
+    return PlusBeside<Pose>(Moved(viewer), &values_[start], TangentOfObject(slot), &moved_[start]);
+  }
+
+ private:
+  double* Reached(int pose) { return &moved_[variables_.PoseStart(pose)]; }
+  const double* TangentOfObject(int slot) const { return &step_[variables_.TangentOfObject(slot)]; }
+  const double* TangentOf(int pose) const {
+    static constexpr double kRest[Pose::kTangentSize] = {};
+    return pose < variables_.first_free_pose ? kRest : &step_[variables_.TangentOfPose(pose)];
+  }
   MovedPose Moved(int pose) const {
-    const int start = stage_.PoseStart(pose);
+    const int start = variables_.PoseStart(pose);
     return {&values_[start], TangentOf(pose), &moved_[start]};
   }
 
-  // The last pose to see each object; the first of all where no box has a weight.
-  std::vector<int> Viewers() const {
-    const BoxTable& boxes = stage_.prepared.graph.boxes;
-    std::vector<int> viewers(slots_.num_objects(), slots_.first_pose);
-    for (const BoxLink& link : stage_.links.boxes) {
-      viewers[slots_.slot_of_object[boxes.object[link.row]]] = boxes.pose[link.row];
-    }
-    return viewers;
-  }
-
-  const PackedStage<Pose>& stage_;
-  const VariableIndex& slots_;
+  const VariableIndex& variables_;
   const VectorXd& values_;
   const VectorXd& step_;
   VectorXd& moved_;
 };
 
+// The last pose to see each object; the first of all where no box has a weight.
+std::vector<int> Viewers(const BoxTable& boxes, const StageTerms& terms) {
+  const VariableIndex& variables = terms.variables;
+  std::vector<int> viewers(variables.num_objects(), variables.first_pose);
+  for (const StageBox& box : terms.boxes) {
+    viewers[variables.slot_of_object[boxes.object[box.row]]] = boxes.pose[box.row];
+  }
+  return viewers;
+}
+
 }  // namespace
 
-template <typename Pose, typename Landmark>
-bool Retract(const PackedStage<Pose>& stage,
+template <typename Pose>
+bool Retract(const VariableIndex& variables,
              const VectorXd& values,
              const VectorXd& step,
              VectorXd* moved) {
-  return StageStep<Pose, Landmark>(stage, values, step, moved).Straight();
+  Step<Pose> steps(variables, values, step, moved);
+  for (int pose = variables.first_free_pose; pose < variables.end_pose; ++pose) {
+    steps.MovePose(pose);
+  }
+  for (int slot = 0; slot < variables.num_objects(); ++slot) {
+    if (!steps.MoveObject(slot)) return false;
+  }
+  return true;
 }
 
-template <typename Pose, typename Landmark>
-bool RetractAlongPath(const PackedStage<Pose>& stage,
+template <typename Pose>
+bool RetractAlongPath(const PreparedGraph& prepared,
+                      const StageTerms& terms,
                       const VectorXd& values,
                       const VectorXd& step,
                       VectorXd* moved) {
-  return StageStep<Pose, Landmark>(stage, values, step, moved).AlongPath();
+  const VariableIndex& variables = terms.variables;
+  Step<Pose> steps(variables, values, step, moved);
+  for (int pose = variables.first_free_pose; pose < variables.end_pose; ++pose) {
+    const int row = prepared.odometry_into[pose];
+    if (row < 0) {
+      steps.MovePose(pose);
+    } else {
+      steps.MovePoseBehind(prepared.graph.odometry.from[row], pose);
+    }
+  }
+  const std::vector<int> viewers = Viewers(prepared.graph.boxes, terms);
+  for (int slot = 0; slot < variables.num_objects(); ++slot) {
+    if (!steps.MoveObjectBeside(viewers[slot], slot)) return false;
+  }
+  return true;
 }
 
-template bool Retract<Se2, EllipsoidModel>(const PackedStage<Se2>&,
-                                           const VectorXd&,
-                                           const VectorXd&,
-                                           VectorXd*);
-template bool RetractAlongPath<Se2, EllipsoidModel>(const PackedStage<Se2>&,
-                                                    const VectorXd&,
-                                                    const VectorXd&,
-                                                    VectorXd*);
-template bool Retract<Se2, DualQuadricModel>(const PackedStage<Se2>&,
-                                             const VectorXd&,
-                                             const VectorXd&,
-                                             VectorXd*);
-template bool RetractAlongPath<Se2, DualQuadricModel>(const PackedStage<Se2>&,
-                                                      const VectorXd&,
-                                                      const VectorXd&,
-                                                      VectorXd*);
-template bool Retract<Se3, EllipsoidModel>(const PackedStage<Se3>&,
-                                           const VectorXd&,
-                                           const VectorXd&,
-                                           VectorXd*);
-template bool RetractAlongPath<Se3, EllipsoidModel>(const PackedStage<Se3>&,
-                                                    const VectorXd&,
-                                                    const VectorXd&,
-                                                    VectorXd*);
-template bool Retract<Se3, DualQuadricModel>(const PackedStage<Se3>&,
-                                             const VectorXd&,
-                                             const VectorXd&,
-                                             VectorXd*);
-template bool RetractAlongPath<Se3, DualQuadricModel>(const PackedStage<Se3>&,
-                                                      const VectorXd&,
-                                                      const VectorXd&,
-                                                      VectorXd*);
+#define DQSLAM_INSTANTIATE(Pose)                                                                  \
+  template bool Retract<Pose>(const VariableIndex&, const VectorXd&, const VectorXd&, VectorXd*); \
+  template bool RetractAlongPath<Pose>(                                                           \
+      const PreparedGraph&, const StageTerms&, const VectorXd&, const VectorXd&, VectorXd*)
+DQSLAM_INSTANTIATE(Se2);
+DQSLAM_INSTANTIATE(Se3);
 
 }  // namespace dqslam

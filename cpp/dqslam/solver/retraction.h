@@ -1,20 +1,21 @@
 // How a step moves the variables of a stage: each by itself, or along the path (path_step.h).
 #pragma once
 
-#include "dqslam/solver/packed_stage.h"
+#include "dqslam/solver/stage_terms.h"
 
 namespace dqslam {
 
 /// False where that is impossible.
-template <typename Pose, typename Landmark>
-bool Retract(const PackedStage<Pose>& stage,
+template <typename Pose>
+bool Retract(const VariableIndex& variables,
              const Eigen::VectorXd& values,
              const Eigen::VectorXd& step,
              Eigen::VectorXd* moved);
 
-/// False where that is impossible, and for dual quadrics, which have no shape to turn.
-template <typename Pose, typename Landmark>
-bool RetractAlongPath(const PackedStage<Pose>& stage,
+/// The same to first order; false where that is impossible.
+template <typename Pose>
+bool RetractAlongPath(const PreparedGraph& prepared,
+                      const StageTerms& terms,
                       const Eigen::VectorXd& values,
                       const Eigen::VectorXd& step,
                       Eigen::VectorXd* moved);

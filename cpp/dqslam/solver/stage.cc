@@ -7,11 +7,20 @@
 #include <limits>
 
 #include "dqslam/geometry/dispatch.h"
-#include "dqslam/solver/assembly.h"
 #include "dqslam/solver/ceres_backend.h"
+#include "dqslam/solver/ceres_problem.h"
 #include "dqslam/solver/trust_region.h"
 
 namespace dqslam {
+namespace {
+
+bool NeedsCeres(const SolveOptions& options, const Stage& stage) {
+  return options.backend == Backend::kCeres || IsAlgebraic(stage.residual) ||
+         options.landmark_model != LandmarkModel::kEllipsoid || stage.loss == Loss::kSwitchable;
+}
+
+}  // namespace
+
 Summary Optimize(const PreparedGraph& prepared,
                  const SolveOptions& options,
                  const Stage& stage,
@@ -19,9 +28,9 @@ Summary Optimize(const PreparedGraph& prepared,
                  State* state) {
   const TrustRegionOptions method{stage.minimizer, stage.max_iterations, stage.function_tolerance};
   Summary summary;
-  if (options.backend == Backend::kCeres) {
+  if (NeedsCeres(options, stage)) {
     ceres::Problem problem;
-    Assemble(prepared, options, stage, state, &problem);
+    MakeCeresProblem(prepared, options, stage, state, &problem);
     summary = MinimizeByCeres(method, monitor, &problem);
   } else {
     const auto problem = MakeLeastSquares(prepared, options, stage, *state);

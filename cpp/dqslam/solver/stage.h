@@ -18,6 +18,11 @@ struct Interrupted : std::runtime_error {
   Interrupted() : std::runtime_error("interrupted") {}
 };
 
+/// Whether a residual is one of the paper's, which only Ceres minimizes.
+inline bool IsAlgebraic(Residual residual) {
+  return residual == Residual::kAlgebraic || residual == Residual::kAlgebraicNormalized;
+}
+
 /// Which part of the graph takes part, and how.
 struct Stage {
   int first_free_pose = 1;                 ///< poses before it are constant
@@ -31,7 +36,9 @@ struct Stage {
   double function_tolerance = 1e-10;  ///< stop when |change of cost| / cost falls below
 };
 
-/// Minimizes from `state` and writes the result there.  Where the box residual is undefined at the
+/// Minimizes from `state` and writes the result there, natively where that is possible: boxes and
+/// tangents of ellipsoids.  Ceres minimizes what only the paper's method and switchable constraints
+/// need, and everything with Backend::kCeres.  Where the box residual is undefined at the
 /// start of the stage, that box uses the tangent residual.  Throws Interrupted.
 Summary Optimize(const PreparedGraph& prepared,
                  const SolveOptions& options,

@@ -1,67 +1,132 @@
-// What all terms of a stage need while one pass goes over them: where their blocks stand, the cost
-// so far and, with derivatives, the normal equations.
+// Every term of a stage, enumerated once: which cost, between which poses and objects.  The native
+// normal equations, Ceres and the covariances are visitors of it; sessions share its priors and its
+// kinds of measurements.
+//
+// A visitor has two methods, both of which return false to stop:
+//   Visit(cost, blocks...)   a functor of costs/, and a PoseRow or an ObjectRow for each block
+//   VisitBox(box)            a StageBox, whose cost VisitBoxCost() names
 #pragma once
 
-#include "dqslam/geometry/jets.h"
-#include "dqslam/linear/normal_equations.h"
-#include "dqslam/solver/packed_stage.h"
+#include <utility>
+
+#include "dqslam/costs/algebraic.h"
+#include "dqslam/costs/box.h"
+#include "dqslam/costs/measurements.h"
+#include "dqslam/costs/odometry.h"
+#include "dqslam/costs/scene_priors.h"
+#include "dqslam/costs/size_prior.h"
+#include "dqslam/costs/tangent.h"
+#include "dqslam/solver/stage_terms.h"
 
 namespace dqslam {
 
-template <int kSize>
-using Vector = Eigen::Matrix<double, kSize, 1>;
-template <int kRows, int kColumns>
-using Matrix = Eigen::Matrix<double, kRows, kColumns>;
+/// A block of a term: a row of the state.
+struct PoseRow {
+  int row;
+};
+struct ObjectRow {
+  int row;
+};
 
-template <typename Pose, bool kDerivatives>
-class Terms {
- public:
-  /// `equations` is null without derivatives. All arguments must outlive this.
-  Terms(const PackedStage<Pose>& stage, const Eigen::VectorXd& values, Accumulator* equations)
-      : stage_(stage), values_(values), equations_(equations) {}
-
-  /// Of the terms that were added.
-  double cost() const { return cost_; }
-
- protected:
-  static constexpr int kTangent = Pose::kTangentSize;
-
-  const Graph& graph() const { return stage_.prepared.graph; }
-  const double* PoseAt(int pose) const { return &values_[stage_.PoseStart(pose)]; }
-  const double* ObjectAt(int object) const {
-    return &values_[stage_.ObjectStart(stage_.slots.slot_of_object[object])];
+/// Calls visit(cost) with the cost of a box, and returns what that returns.
+template <typename Pose, typename Landmark, typename Visit>
+auto VisitBoxCost(const PreparedGraph& prepared,
+                  const SolveOptions& options,
+                  const StageBox& box,
+                  Visit&& visit) {
+  const Camera& camera = prepared.graph.camera;
+  const Mount& mount = prepared.mount;
+  const Eigen::Vector4d observed = prepared.graph.boxes.box.row(box.row);
+  const Eigen::Matrix4d& sqrt_information = prepared.box_sqrt_information[box.row];
+  const BoxResidual& role = box.residual;
+  if (IsAlgebraic(role.residual)) {
+    return visit(
+        AlgebraicCost<Pose, Landmark>{{},
+                                      mount,
+                                      BoxLines(camera, observed),
+                                      Eigen::Matrix4d::Identity() / options.algebraic_sigma,
+                                      role.residual == Residual::kAlgebraicNormalized});
   }
-  int PoseBlock(int pose) const { return stage_.slots.PoseBlock(pose); }
-  int ObjectBlock(int object) const { return stage_.slots.ObjectBlock(object); }
+  if (role.residual == Residual::kBox) {
+    return visit(
+        BoxCost<Pose, Landmark>{{}, camera, mount, observed, sqrt_information, role.one_sided});
+  }
+  return visit(TangentCost<Pose, Landmark>{
+      {}, camera, mount, observed, sqrt_information, role.depth, role.one_sided});
+}
 
-  // A cost of a pose and a landmark.
-  template <int kResiduals, typename Term>
-  bool Differentiate(const Term& term,
-                     int pose,
-                     int object,
-                     Vector<kResiduals>* residual,
-                     Matrix<kResiduals, kTangent>* by_pose,
-                     Matrix<kResiduals, kLandmarkSize>* by_object) const {
-    if constexpr (kDerivatives) {
-      using Jet = ceres::Jet<double, kTangent + kLandmarkSize>;
-      Jet a[Pose::kSize], b[kLandmarkSize], jets[kResiduals];
-      PoseJets<Pose>(PoseAt(pose), 0, a);
-      PlainJets<kLandmarkSize>(ObjectAt(object), kTangent, b);
-      if (!term(a, b, jets)) return false;
-      Matrix<kResiduals, kTangent + kLandmarkSize> J;
-      SplitJets(jets, residual, &J);
-      *by_pose = J.template leftCols<kTangent>();
-      *by_object = J.template rightCols<kLandmarkSize>();
-      return true;
-    } else {
-      return term(PoseAt(pose), ObjectAt(object), residual->data());
+/// Calls visit(cost) with each prior on an ellipsoid; false where a call returns false.
+template <typename Visit>
+bool VisitObjectPriors(double log_size_mean,
+                       double log_size_sigma,
+                       const ScenePriors& scene,
+                       Visit&& visit) {
+  if (!visit(SizePriorCost{{}, log_size_mean, log_size_sigma})) return false;
+  if (scene.upright_sigma > 0 && !visit(UprightCost{{}, scene.up, scene.upright_sigma})) {
+    return false;
+  }
+  return scene.support_sigma == 0 ||
+         visit(SupportPlaneCost{{}, scene.up, scene.plane_offset, scene.support_sigma});
+}
+
+/// Calls visit(cost) with each prior on a pose; false where a call returns false.
+template <typename Pose, typename Visit>
+bool VisitPosePriors(const Mount& mount, const ScenePriors& scene, Visit&& visit) {
+  return scene.camera_height_sigma == 0 || visit(CameraHeightCost<Pose>{{},
+                                                                        mount,
+                                                                        scene.up,
+                                                                        scene.plane_offset,
+                                                                        scene.camera_height,
+                                                                        scene.camera_height_sigma});
+}
+
+/// Visits all terms; false where a visit returned false.
+template <typename Pose, typename Landmark, typename Visitor>
+bool VisitTerms(const PreparedGraph& prepared, const StageTerms& terms, Visitor* visitor) {
+  const Graph& graph = prepared.graph;
+  for (const int row : terms.odometry) {
+    using Square = Eigen::Matrix<double, Pose::kTangentSize, Pose::kTangentSize>;
+    const OdometryCost<Pose> cost{{},
+                                  graph.odometry.relative.row(row).transpose(),
+                                  Square(prepared.odometry_sqrt_information[row])};
+    const PoseRow from{graph.odometry.from[row]}, to{graph.odometry.to[row]};
+    if (!visitor->Visit(cost, from, to)) return false;
+  }
+  for (const StageBox& box : terms.boxes) {
+    if (!visitor->VisitBox(box)) return false;
+  }
+  for (size_t t = 0; t < terms.measurements.size(); ++t) {
+    const MeasurementTable& table = graph.measurements[t];
+    const bool defined =
+        VisitMeasurementKind<Pose, Landmark>(prepared.measurement_kinds[t], [&](auto tag) {
+          for (const int row : terms.measurements[t]) {
+            const auto cost = MakeMeasurementCost<typename decltype(tag)::Cost>(
+                table.value.row(row).data(),
+                prepared.measurement_sqrt_information[t].row(row).data());
+            const PoseRow pose{table.pose[row]};
+            const ObjectRow object{table.object[row]};
+            if (!visitor->Visit(cost, pose, object)) return false;
+          }
+          return true;
+        });
+    if (!defined) return false;
+  }
+  if constexpr (Landmark::kModel == LandmarkModel::kEllipsoid) {
+    for (const int object : terms.variables.objects) {
+      const bool defined = VisitObjectPriors(
+          graph.size_prior.log_mean[object],
+          graph.size_prior.log_sigma[object],
+          graph.scene_priors,
+          [&](const auto& cost) { return visitor->Visit(cost, ObjectRow{object}); });
+      if (!defined) return false;
     }
   }
-
-  const PackedStage<Pose>& stage_;
-  const Eigen::VectorXd& values_;
-  Accumulator* equations_;
-  double cost_ = 0;
-};
+  return VisitPosePriors<Pose>(prepared.mount, graph.scene_priors, [&](const auto& cost) {
+    for (int pose = terms.variables.first_free_pose; pose < terms.variables.end_pose; ++pose) {
+      if (!visitor->Visit(cost, PoseRow{pose})) return false;
+    }
+    return true;
+  });
+}
 
 }  // namespace dqslam

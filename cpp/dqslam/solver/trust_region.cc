@@ -41,7 +41,7 @@ class Trial {
   // predicts, and less. Returns the decrease: minus infinity where a residual is undefined.
   double Take(const VectorXd& values, const VectorXd& step, double predicted) {
     const double before = problem_.equations().cost;
-    cost_ = CostOf(problem_.Plus(values, step, &reached_), reached_);
+    cost_ = CostOf(problem_.Retract(values, step, &reached_), reached_);
     if (!(before - cost_ > kPoorGain * predicted)) {
       const double along_path =
           CostOf(problem_.RetractAlongPath(values, step, &along_path_), along_path_);

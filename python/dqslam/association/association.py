@@ -84,7 +84,7 @@ def associate(
     claims = recording.detections.object_id
     if trust == FINAL:
         reject_rows("detections.object_id", claims < 0, "final ids are needed: the box has none")
-    recording = replace(recording, positions=None)
+    recording = replace(recording, positions=None, measurements=())
     tracklet = link_tracklets(recording, claims=claims)
     keyframes = choose_keyframes(recording, tracklet)
     used = np.isin(recording.detections.pose, keyframes)

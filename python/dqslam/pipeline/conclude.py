@@ -98,7 +98,9 @@ def conclude(
         "reprojection": describe_overlap(overlap) | {"held_out": tests_held_out},
         "box_noise": {"pixels": outcome.box_noise.pixels, "relative": outcome.box_noise.relative},
         "odometry_noise": _describe_noise(outcome.odometry_noise),
-        "under_constrained": list(outcome.marginals.under_constrained) if outcome.marginals else [],
+        "under_constrained": [str(part) for part in outcome.marginals.under_constrained]
+        if outcome.marginals
+        else [],
         "trajectory_error": None if reference is None else trajectory_error(estimate, reference),
         "solver": None if outcome.summary is None else describe_solver(outcome.summary),
     }

@@ -19,7 +19,7 @@ from dqslam.pipeline.border import with_cut_edges
 from dqslam.pipeline.conclude import Outcome, RunResult, conclude
 from dqslam.pipeline.hold_out import choose_held_out
 from dqslam.recording import Recording
-from dqslam.uncertainty import Marginals, marginal_covariances
+from dqslam.uncertainty import Marginals, UnderConstrained, marginal_covariances
 
 
 def perturb_odometry(
@@ -160,16 +160,15 @@ def _finish(
         marginals,
         poses=poses,
         objects=marginals.objects[order],
-        under_constrained=tuple(_named(text, found) for text in marginals.under_constrained),
+        under_constrained=tuple(_named(each, found) for each in marginals.under_constrained),
     )
     return estimate, marginals, summary
 
 
-def _named(sentence: str, found: Association) -> str:
+def _named(part: UnderConstrained, found: Association) -> UnderConstrained:
     """Name a pose by its row in the recording and an object by its id, not as in the solve."""
-    kind, row, what = sentence.split(" ", 2)  # "object 3: parameter 0 is ..."
-    names = found.keyframes if kind == "pose" else found.ids
-    return f"{kind} {names[int(row.rstrip(':'))]}: {what}"
+    names = found.keyframes if part.kind == "pose" else found.ids
+    return replace(part, name=int(names[part.name]))
 
 
 def _nothing(recording: Recording, path: NDArray[np.float64], dropped: dict[int, str]) -> Estimate:

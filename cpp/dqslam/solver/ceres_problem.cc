@@ -1,0 +1,101 @@
+#include "dqslam/solver/ceres_problem.h"
+
+#include <ceres/loss_function.h>
+#include <ceres/problem.h>
+
+#include <cmath>
+
+#include "dqslam/costs/switched.h"
+#include "dqslam/geometry/dispatch.h"
+#include "dqslam/geometry/manifolds.h"
+#include "dqslam/solver/loss.h"
+#include "dqslam/solver/terms.h"
+
+namespace dqslam {
+namespace {
+
+// A visitor of terms that makes each a residual block.
+template <typename Pose, typename Landmark>
+class ResidualBlocks {
+ public:
+  ResidualBlocks(const PreparedGraph& prepared,
+                 const SolveOptions& options,
+                 Loss loss,
+                 State* state,
+                 ceres::Problem* problem)
+      : prepared_(prepared), options_(options), loss_(loss), state_(*state), problem_(*problem) {}
+
+  void AddVariables(const VariableIndex& variables) {
+    auto* manifold = new PoseManifold<Pose>;  // the problem owns it, once for all poses
+    for (int pose = 0; pose < variables.end_pose; ++pose) {
+      double* parameters = ParametersOf(PoseRow{pose});
+      problem_.AddParameterBlock(parameters, Pose::kSize, manifold);
+      if (pose < variables.first_free_pose) problem_.SetParameterBlockConstant(parameters);
+    }
+    EllipsoidManifold* of_ellipsoids = nullptr;
+    for (const int object : variables.objects) {
+      double* parameters = ParametersOf(ObjectRow{object});
+      problem_.AddParameterBlock(parameters, kLandmarkSize);
+      if (Landmark::kModel != LandmarkModel::kEllipsoid) continue;
+      if (!of_ellipsoids) of_ellipsoids = new EllipsoidManifold;
+      problem_.SetManifold(parameters, of_ellipsoids);
+    }
+  }
+
+  template <typename Cost, typename... Rows>
+  bool Visit(const Cost& cost, const Rows&... rows) {
+    problem_.AddResidualBlock(Cost::CreateFrom(cost), nullptr, ParametersOf(rows)...);
+    return true;
+  }
+
+  bool VisitBox(const StageBox& box) {
+    const BoxTable& boxes = prepared_.graph.boxes;
+    double* pose = ParametersOf(PoseRow{boxes.pose[box.row]});
+    double* object = ParametersOf(ObjectRow{boxes.object[box.row]});
+    return VisitBoxCost<Pose, Landmark>(prepared_, options_, box, [&](const auto& cost) {
+      using Cost = std::decay_t<decltype(cost)>;
+      if (loss_ == Loss::kSwitchable) {
+        const double sqrt_phi = std::sqrt(options_.outlier_chi_square);
+        problem_.AddResidualBlock(SwitchedCost<Pose, Cost>::Create(cost, sqrt_phi),
+                                  nullptr,
+                                  pose,
+                                  object,
+                                  &state_.switches[box.row]);
+        return true;
+      }
+      ceres::LossFunction* loss = MakeLoss(loss_, options_).release();
+      if (box.weight != 1) loss = new ceres::ScaledLoss(loss, box.weight, ceres::TAKE_OWNERSHIP);
+      problem_.AddResidualBlock(Cost::CreateFrom(cost), loss, pose, object);
+      return true;
+    });
+  }
+
+ private:
+  double* ParametersOf(PoseRow pose) { return state_.poses.row(pose.row).data(); }
+  double* ParametersOf(ObjectRow object) { return state_.landmarks.row(object.row).data(); }
+
+  const PreparedGraph& prepared_;
+  const SolveOptions& options_;
+  Loss loss_;
+  State& state_;
+  ceres::Problem& problem_;
+};
+
+}  // namespace
+
+void MakeCeresProblem(const PreparedGraph& prepared,
+                      const SolveOptions& options,
+                      const Stage& stage,
+                      State* state,
+                      ceres::Problem* problem) {
+  const StageTerms terms = SelectTerms(prepared, options, stage, *state);
+  Dispatch(prepared.graph.pose_model, options.landmark_model, [&](auto pose, auto landmark) {
+    using Pose = decltype(pose);
+    using Landmark = decltype(landmark);
+    ResidualBlocks<Pose, Landmark> blocks(prepared, options, stage.loss, state, problem);
+    blocks.AddVariables(terms.variables);
+    VisitTerms<Pose, Landmark>(prepared, terms, &blocks);
+  });
+}
+
+}  // namespace dqslam

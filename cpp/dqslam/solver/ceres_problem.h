@@ -1,0 +1,20 @@
+// A stage as a ceres::Problem over the rows of a state.
+#pragma once
+
+#include "dqslam/solver/stage.h"
+
+namespace ceres {
+class Problem;
+}
+
+namespace dqslam {
+
+/// Adds all terms of the stage, and the poses and objects that they are about.  The problem points
+/// into `state`, which must outlive it.
+void MakeCeresProblem(const PreparedGraph& prepared,
+                      const SolveOptions& options,
+                      const Stage& stage,
+                      State* state,
+                      ceres::Problem* problem);
+
+}  // namespace dqslam

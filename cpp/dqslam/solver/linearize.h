@@ -1,0 +1,178 @@
+// Residuals and derivatives of the terms of a stage, added up into normal equations.
+//
+// Boxes, nine tenths of all terms, are differentiated by hand (geometry/box_derivatives.h); all
+// other costs by AutoDiff on jets (geometry/jets.h).
+#pragma once
+
+#include <ceres/loss_function.h>
+
+#include <cmath>
+#include <vector>
+
+#include "dqslam/geometry/box_derivatives.h"
+#include "dqslam/geometry/jets.h"
+#include "dqslam/linear/normal_equations.h"
+#include "dqslam/solver/terms.h"
+
+namespace dqslam {
+
+template <int kRows, int kColumns>
+using Matrix = Eigen::Matrix<double, kRows, kColumns>;
+
+/// Residual of a box or its tangents, in sigmas, and its Jacobians; without derivatives, these stay
+/// as they are.  False where it is undefined.
+template <typename Pose, bool kDerivatives>
+bool LinearizeBox(const PreparedGraph& prepared,
+                  const StageBox& box,
+                  const Station& station,
+                  const Unpacked<EllipsoidModel>& ellipsoid,
+                  Eigen::Vector4d* residual,
+                  Matrix<kBoxSize, Pose::kTangentSize>* by_pose,
+                  Matrix<kBoxSize, kLandmarkSize>* by_object) {
+  const Eigen::Vector4d observed = prepared.graph.boxes.box.row(box.row).transpose();
+  Eigen::Vector4d error;
+  EdgeDerivatives edges;
+  if (!EdgeErrors<kDerivatives>(ToCamera(station.camera, ellipsoid.surface),
+                                prepared.graph.camera,
+                                observed,
+                                box.residual.depth,
+                                box.residual.one_sided,
+                                &error,
+                                &edges)) {
+    return false;
+  }
+  const Eigen::Matrix4d& whiten = prepared.box_sqrt_information[box.row];
+  residual->noalias() = whiten * error;
+  if constexpr (kDerivatives) {
+    Matrix<kBoxSize, Pose::kTangentSize> J_pose;
+    Matrix<kBoxSize, kLandmarkSize> J_object;
+    ByPoseAndLandmark<Pose>(edges, station, prepared.mount, ellipsoid, &J_pose, &J_object);
+    by_pose->noalias() = whiten * J_pose;
+    by_object->noalias() = whiten * J_object;
+  }
+  return true;
+}
+
+/// A visitor of terms that adds them up at some values, with derivatives or without.
+template <typename Pose, bool kDerivatives>
+class Linearizer {
+ public:
+  /// `loss` is that of whole boxes, null for none; `off_diagonal` the blocks of H that the terms of
+  /// two blocks fill, in their order; `equations` is null without derivatives.
+  Linearizer(const PreparedGraph& prepared,
+             const StageTerms& terms,
+             const ceres::LossFunction* loss,
+             const std::vector<int>& off_diagonal,
+             const Eigen::VectorXd& values,
+             Accumulator* equations)
+      : prepared_(prepared),
+        variables_(terms.variables),
+        loss_(loss),
+        off_diagonal_(off_diagonal.data()),
+        values_(values),
+        equations_(equations) {
+    stations_.reserve(variables_.num_poses());
+    for (int pose = variables_.first_pose; pose < variables_.end_pose; ++pose) {
+      stations_.push_back(Station::At<Pose>(ParametersOf(PoseRow{pose}).values, prepared.mount));
+    }
+    ellipsoids_.reserve(variables_.num_objects());
+    for (const int object : variables_.objects) {
+      ellipsoids_.emplace_back(ParametersOf(ObjectRow{object}).values);
+    }
+  }
+
+  /// Half the sum of the squared residuals so far, after the loss.
+  double cost() const { return cost_; }
+
+  template <typename Cost, typename... Rows>
+  bool Visit(const Cost& cost, const Rows&... rows) {
+    constexpr int m = Cost::kResidualSize;
+    Matrix<m, 1> residual;
+    if constexpr (kDerivatives) {
+      Matrix<m, (kTangentOf<Rows> + ...)> jacobian;
+      if (!Differentiate(cost, &residual, &jacobian, ParametersOf(rows)...)) return false;
+      Add(residual, jacobian, rows...);
+    } else {
+      if (!cost(ParametersOf(rows).values..., residual.data())) return false;
+    }
+    cost_ += 0.5 * residual.squaredNorm();
+    return true;
+  }
+
+  bool VisitBox(const StageBox& box) {
+    const int pose = prepared_.graph.boxes.pose[box.row];
+    const int object = prepared_.graph.boxes.object[box.row];
+    Eigen::Vector4d residual;
+    Matrix<kBoxSize, kTangent> by_pose;
+    Matrix<kBoxSize, kLandmarkSize> by_object;
+    if (!LinearizeBox<Pose, kDerivatives>(prepared_,
+                                          box,
+                                          stations_[pose - variables_.first_pose],
+                                          ellipsoids_[variables_.slot_of_object[object]],
+                                          &residual,
+                                          &by_pose,
+                                          &by_object)) {
+      return false;
+    }
+    double rho[3] = {residual.squaredNorm(), 1, 0};
+    if (loss_) loss_->Evaluate(rho[0], rho);
+    cost_ += 0.5 * box.weight * rho[0];
+    if constexpr (kDerivatives) {
+      const double scale = box.weight * rho[1];
+      if (scale != 1) {
+        const double root = std::sqrt(scale);
+        residual *= root;
+        by_pose *= root;
+        by_object *= root;
+      }
+      equations_->AddDiagonal(BlockOf(PoseRow{pose}), by_pose, residual);
+      equations_->AddDiagonal(BlockOf(ObjectRow{object}), by_object, residual);
+      equations_->AddOffDiagonal(*off_diagonal_++, by_pose, by_object);
+    }
+    return true;
+  }
+
+ private:
+  static constexpr int kTangent = Pose::kTangentSize;
+  template <typename Row>
+  static constexpr int kTangentOf = std::is_same_v<Row, PoseRow> ? kTangent : kLandmarkSize;
+
+  PoseParameters<Pose> ParametersOf(PoseRow pose) const {
+    return {&values_[variables_.PoseStart(pose.row)]};
+  }
+  ObjectParameters ParametersOf(ObjectRow object) const {
+    return {&values_[variables_.ObjectStart(variables_.slot_of_object[object.row])]};
+  }
+  int BlockOf(PoseRow pose) const { return variables_.PoseBlock(pose.row); }
+  int BlockOf(ObjectRow object) const { return variables_.ObjectBlock(object.row); }
+
+  template <int m, typename Row>
+  void Add(const Matrix<m, 1>& residual, const Matrix<m, kTangentOf<Row>>& jacobian, Row row) {
+    equations_->AddDiagonal(BlockOf(row), jacobian, residual);
+  }
+
+  template <int m, int kColumns, typename A, typename B>
+  void Add(const Matrix<m, 1>& residual, const Matrix<m, kColumns>& jacobian, A a, B b) {
+    const Matrix<m, kTangentOf<A>> by_a = jacobian.template leftCols<kTangentOf<A>>();
+    const Matrix<m, kTangentOf<B>> by_b = jacobian.template rightCols<kTangentOf<B>>();
+    equations_->AddDiagonal(BlockOf(a), by_a, residual);
+    equations_->AddDiagonal(BlockOf(b), by_b, residual);
+    if (BlockOf(a) < BlockOf(b)) {
+      equations_->AddOffDiagonal(*off_diagonal_++, by_a, by_b);
+    } else {
+      equations_->AddOffDiagonal(*off_diagonal_++, by_b, by_a);
+    }
+  }
+
+  const PreparedGraph& prepared_;
+  const VariableIndex& variables_;
+  const ceres::LossFunction* loss_;
+  const int* off_diagonal_;  // of the next term of two blocks
+  const Eigen::VectorXd& values_;
+  Accumulator* equations_;
+  std::vector<Station> stations_;                     // of all poses
+  std::vector<Unpacked<EllipsoidModel>> ellipsoids_;  // by slot
+  double cost_ = 0;
+};
+
+}  // namespace dqslam

@@ -1,0 +1,89 @@
+#include "dqslam/solver/stage_terms.h"
+
+#include <algorithm>
+
+namespace dqslam {
+namespace {
+
+VariableIndex IndexVariables(const Graph& graph, const Stage& stage) {
+  VariableIndex variables;
+  variables.pose_size = graph.pose_size();
+  variables.tangent_size = graph.tangent_size();
+  variables.first_free_pose = stage.first_free_pose;
+  variables.first_pose = std::min(stage.first_free_pose, stage.end_pose);
+  variables.end_pose = stage.end_pose;
+  variables.slot_of_object.assign(graph.num_objects(), -1);
+  for (const int row : stage.boxes) {
+    variables.slot_of_object[graph.boxes.object[row]] = 0;
+    variables.first_pose = std::min(variables.first_pose, graph.boxes.pose[row]);
+  }
+  for (int object = 0; object < graph.num_objects(); ++object) {
+    if (variables.slot_of_object[object] < 0) continue;
+    variables.slot_of_object[object] = variables.num_objects();
+    variables.objects.push_back(object);
+  }
+  return variables;
+}
+
+Surface<double> UnpackAny(LandmarkModel model, const double* parameters) {
+  return model == LandmarkModel::kEllipsoid ? EllipsoidModel::Unpack(parameters)
+                                            : DualQuadricModel::Unpack(parameters);
+}
+
+BoxResidual ChooseResidual(const PreparedGraph& prepared,
+                           const SolveOptions& options,
+                           const Stage& stage,
+                           const State& state,
+                           int row) {
+  BoxResidual chosen;
+  chosen.residual = stage.residual;
+  if (IsAlgebraic(stage.residual)) return chosen;
+  const Graph& graph = prepared.graph;
+  const Surface<double> surface = ToCamera(
+      LocateCamera(prepared, state, graph.boxes.pose[row]),
+      UnpackAny(options.landmark_model, state.landmarks.row(graph.boxes.object[row]).data()));
+  chosen.one_sided = OneSidedEdges(prepared, row, surface);
+  Eigen::Vector4d predicted;
+  if (stage.residual == Residual::kBox && ProjectToBox(surface, graph.camera, &predicted)) {
+    return chosen;
+  }
+  chosen.residual = Residual::kTangent;
+  chosen.depth = TangentDepth(surface);
+  return chosen;
+}
+
+}  // namespace
+
+StageTerms SelectTerms(const PreparedGraph& prepared,
+                       const SolveOptions& options,
+                       const Stage& stage,
+                       const State& state) {
+  const Graph& graph = prepared.graph;
+  StageTerms terms{IndexVariables(graph, stage), {}, {}, {}};
+  VariableIndex& variables = terms.variables;
+  for (int row = 0; row < graph.odometry.size(); ++row) {
+    const auto [earlier, later] = std::minmax(graph.odometry.from[row], graph.odometry.to[row]);
+    if (later < stage.first_free_pose || later >= stage.end_pose) continue;
+    variables.first_pose = std::min<int>(variables.first_pose, earlier);
+    terms.odometry.push_back(row);
+  }
+  terms.boxes.reserve(stage.boxes.size());
+  for (size_t i = 0; i < stage.boxes.size(); ++i) {
+    const int row = stage.boxes[i];
+    const double weight = stage.weights.empty() ? 1.0 : stage.weights[i];
+    if (weight == 0) continue;
+    terms.boxes.push_back({row, weight, ChooseResidual(prepared, options, stage, state, row)});
+  }
+  for (const MeasurementTable& table : graph.measurements) {
+    std::vector<int>& rows = terms.measurements.emplace_back();
+    for (int row = 0; row < table.size(); ++row) {
+      const int pose = table.pose[row];
+      if (pose >= stage.end_pose || variables.slot_of_object[table.object[row]] < 0) continue;
+      variables.first_pose = std::min(variables.first_pose, pose);
+      rows.push_back(row);
+    }
+  }
+  return terms;
+}
+
+}  // namespace dqslam

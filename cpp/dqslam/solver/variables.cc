@@ -1,0 +1,33 @@
+#include "dqslam/solver/variables.h"
+
+#include <algorithm>
+
+namespace dqslam {
+
+std::vector<int> VariableIndex::BlockSizes() const {
+  std::vector<int> sizes(num_free_poses(), tangent_size);
+  sizes.insert(sizes.end(), num_objects(), kLandmarkSize);
+  return sizes;
+}
+
+Eigen::VectorXd VariableIndex::Pack(const State& state) const {
+  Eigen::VectorXd values(num_values());
+  for (int pose = first_pose; pose < end_pose; ++pose) {
+    values.segment(PoseStart(pose), pose_size) = state.poses.row(pose).transpose();
+  }
+  for (int slot = 0; slot < num_objects(); ++slot) {
+    values.segment<kLandmarkSize>(ObjectStart(slot)) = state.landmarks.row(objects[slot]);
+  }
+  return values;
+}
+
+void VariableIndex::Unpack(const Eigen::VectorXd& values, State* state) const {
+  for (int pose = std::max(first_pose, first_free_pose); pose < end_pose; ++pose) {
+    state->poses.row(pose) = values.segment(PoseStart(pose), pose_size).transpose();
+  }
+  for (int slot = 0; slot < num_objects(); ++slot) {
+    state->landmarks.row(objects[slot]) = values.segment<kLandmarkSize>(ObjectStart(slot));
+  }
+}
+
+}  // namespace dqslam
