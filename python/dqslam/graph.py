@@ -206,7 +206,7 @@ def _measurements(recording: Recording) -> list[Measurements]:
 
 def _table(measured: Measurements, object_ids: Ints) -> _core.MeasurementTable:
     has_no_box = ~np.isin(measured.object_id, object_ids)
-    name = f"{measured.kind}.object_id"
+    name = f"{measured.kind}s.object_id"
     reject_rows(name, has_no_box, "the object has no box", measured.object_id)
     return _core.MeasurementTable(
         kind=measured.kind,

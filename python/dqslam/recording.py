@@ -172,14 +172,14 @@ class Measurements:
 
     def __post_init__(self) -> None:
         """Check shapes and numbers; the core knows the kinds."""
-        value = as_floats(f"{self.kind}.value", self.value, [None, None])
+        value = as_floats(f"{self.kind}s.value", self.value, [None, None])
         count, size = value.shape
         _set(
             self,
-            pose=as_ints(f"{self.kind}.pose", self.pose, count),
-            object_id=as_ints(f"{self.kind}.object_id", self.object_id, count),
+            pose=as_ints(f"{self.kind}s.pose", self.pose, count),
+            object_id=as_ints(f"{self.kind}s.object_id", self.object_id, count),
             value=value,
-            covariance=as_covariances(f"{self.kind}.covariance", self.covariance, count, size),
+            covariance=as_covariances(f"{self.kind}s.covariance", self.covariance, count, size),
         )
 
     def __len__(self) -> int:
@@ -215,7 +215,7 @@ class Recording:
         if self.positions is not None:
             _check_poses("positions.pose", self.positions.pose, count)
         for measured in self.measurements:
-            _check_poses(f"{measured.kind}.pose", measured.pose, count)
+            _check_poses(f"{measured.kind}s.pose", measured.pose, count)
         self._check_boxes_meet_image()
         _set(self, timestamps=timestamps)
 

