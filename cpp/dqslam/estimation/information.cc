@@ -53,7 +53,7 @@ class JacobianRows {
   template <typename Cost, typename... Rows>
   bool Visit(const Cost& cost, const Rows&... rows) {
     Matrix<Cost::kResidualSize, 1> residual;
-    Matrix<Cost::kResidualSize, (kTangentOf<Rows> + ...)> jacobian;
+    Matrix<Cost::kResidualSize, (kTangentOf<Pose, Rows> + ...)> jacobian;
     if (!Differentiate(cost, &residual, &jacobian, ParametersOf(rows)...)) return false;
     Add(residual, jacobian, rows...);
     return true;
@@ -73,29 +73,21 @@ class JacobianRows {
     const int rows = static_cast<int>(residuals_.size());
     information->residuals = Eigen::Map<const Eigen::VectorXd>(residuals_.data(), rows);
     starts_.push_back(static_cast<int>(columns_.size()));
-    information->jacobian = Eigen::Map<const Eigen::SparseMatrix<double, Eigen::RowMajor>>(
-        rows,
-        variables_.num_free_poses() * Pose::kTangentSize + variables_.num_objects() * kLandmarkSize,
-        starts_.back(),
-        starts_.data(),
-        columns_.data(),
-        values_.data());
+    information->jacobian =
+        Eigen::Map<const Eigen::SparseMatrix<double, Eigen::RowMajor>>(rows,
+                                                                       variables_.num_tangents(),
+                                                                       starts_.back(),
+                                                                       starts_.data(),
+                                                                       columns_.data(),
+                                                                       values_.data());
   }
 
  private:
+  const double* ValuesOf(PoseRow pose) const { return state_.poses.row(pose.row).data(); }
+  const double* ValuesOf(ObjectRow object) const { return state_.landmarks.row(object.row).data(); }
   template <typename Row>
-  static constexpr int kTangentOf =
-      std::is_same_v<Row, PoseRow> ? Pose::kTangentSize : kLandmarkSize;
-
-  PoseParameters<Pose> ParametersOf(PoseRow pose) const {
-    return {state_.poses.row(pose.row).data()};
-  }
-  ObjectParameters ParametersOf(ObjectRow object) const {
-    return {state_.landmarks.row(object.row).data()};
-  }
-  int ColumnOf(PoseRow pose) const { return variables_.TangentOfPose(pose.row); }
-  int ColumnOf(ObjectRow object) const {
-    return variables_.TangentOfObject(variables_.slot_of_object[object.row]);
+  auto ParametersOf(Row row) const {
+    return dqslam::ParametersOf<Pose>(row, ValuesOf(row));
   }
 
   // Boxes and tangents, differentiated by hand.
@@ -103,8 +95,8 @@ class JacobianRows {
     Matrix<kBoxSize, 1> residual;
     Matrix<kBoxSize, Pose::kTangentSize> by_pose;
     Matrix<kBoxSize, kLandmarkSize> by_object;
-    const Station station = Station::At<Pose>(ParametersOf(pose).values, prepared_.mount);
-    const Unpacked<EllipsoidModel> ellipsoid(ParametersOf(object).values);
+    const Station station = Station::At<Pose>(ValuesOf(pose), prepared_.mount);
+    const Unpacked<EllipsoidModel> ellipsoid(ValuesOf(object));
     if (!LinearizeBox<Pose, true>(
             prepared_, box, station, ellipsoid, &residual, &by_pose, &by_object)) {
       return false;
@@ -123,7 +115,9 @@ class JacobianRows {
     };
     int first = 0;
     std::array<Block, sizeof...(Rows)> blocks{
-        Block{ColumnOf(rows), (first += kTangentOf<Rows>)-kTangentOf<Rows>, kTangentOf<Rows>}...};
+        Block{variables_.Tangent(rows),
+              (first += kTangentOf<Pose, Rows>)-kTangentOf<Pose, Rows>,
+              kTangentOf<Pose, Rows>}...};
     std::sort(blocks.begin(), blocks.end(), [](const Block& a, const Block& b) {
       return a.column < b.column;
     });

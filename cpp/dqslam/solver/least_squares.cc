@@ -22,12 +22,12 @@ class PairCollector {
 
   template <typename Cost, typename... Rows>
   bool Visit(const Cost&, const Rows&... rows) {
-    if constexpr (sizeof...(Rows) == 2) Add(BlockOf(rows)...);
+    if constexpr (sizeof...(Rows) == 2) Add(variables_.Block(rows)...);
     return true;
   }
   bool VisitBox(const StageBox& box) {
-    Add(variables_.PoseBlock(graph_.boxes.pose[box.row]),
-        variables_.ObjectBlock(graph_.boxes.object[box.row]));
+    Add(variables_.Block(PoseRow{graph_.boxes.pose[box.row]}),
+        variables_.Block(ObjectRow{graph_.boxes.object[box.row]}));
     return true;
   }
 
@@ -35,8 +35,6 @@ class PairCollector {
   const std::vector<std::pair<int, int>>& all() const { return pairs_; }
 
  private:
-  int BlockOf(PoseRow pose) const { return variables_.PoseBlock(pose.row); }
-  int BlockOf(ObjectRow object) const { return variables_.ObjectBlock(object.row); }
   void Add(int a, int b) { pairs_.emplace_back(a, b); }
 
   const Graph& graph_;

@@ -89,7 +89,7 @@ class Linearizer {
     constexpr int m = Cost::kResidualSize;
     Matrix<m, 1> residual;
     if constexpr (kDerivatives) {
-      Matrix<m, (kTangentOf<Rows> + ...)> jacobian;
+      Matrix<m, (kTangentOf<Pose, Rows> + ...)> jacobian;
       if (!Differentiate(cost, &residual, &jacobian, ParametersOf(rows)...)) return false;
       Add(residual, jacobian, rows...);
     } else {
@@ -125,8 +125,8 @@ class Linearizer {
         by_pose *= root;
         by_object *= root;
       }
-      equations_->AddDiagonal(BlockOf(PoseRow{pose}), by_pose, residual);
-      equations_->AddDiagonal(BlockOf(ObjectRow{object}), by_object, residual);
+      equations_->AddDiagonal(variables_.Block(PoseRow{pose}), by_pose, residual);
+      equations_->AddDiagonal(variables_.Block(ObjectRow{object}), by_object, residual);
       equations_->AddOffDiagonal(*off_diagonal_++, by_pose, by_object);
     }
     return true;
@@ -135,29 +135,24 @@ class Linearizer {
  private:
   static constexpr int kTangent = Pose::kTangentSize;
   template <typename Row>
-  static constexpr int kTangentOf = std::is_same_v<Row, PoseRow> ? kTangent : kLandmarkSize;
-
-  PoseParameters<Pose> ParametersOf(PoseRow pose) const {
-    return {&values_[variables_.PoseStart(pose.row)]};
+  auto ParametersOf(Row row) const {
+    return dqslam::ParametersOf<Pose>(row, &values_[variables_.Start(row)]);
   }
-  ObjectParameters ParametersOf(ObjectRow object) const {
-    return {&values_[variables_.ObjectStart(variables_.slot_of_object[object.row])]};
-  }
-  int BlockOf(PoseRow pose) const { return variables_.PoseBlock(pose.row); }
-  int BlockOf(ObjectRow object) const { return variables_.ObjectBlock(object.row); }
 
   template <int m, typename Row>
-  void Add(const Matrix<m, 1>& residual, const Matrix<m, kTangentOf<Row>>& jacobian, Row row) {
-    equations_->AddDiagonal(BlockOf(row), jacobian, residual);
+  void Add(const Matrix<m, 1>& residual,
+           const Matrix<m, kTangentOf<Pose, Row>>& jacobian,
+           Row row) {
+    equations_->AddDiagonal(variables_.Block(row), jacobian, residual);
   }
 
   template <int m, int kColumns, typename A, typename B>
   void Add(const Matrix<m, 1>& residual, const Matrix<m, kColumns>& jacobian, A a, B b) {
-    const Matrix<m, kTangentOf<A>> by_a = jacobian.template leftCols<kTangentOf<A>>();
-    const Matrix<m, kTangentOf<B>> by_b = jacobian.template rightCols<kTangentOf<B>>();
-    equations_->AddDiagonal(BlockOf(a), by_a, residual);
-    equations_->AddDiagonal(BlockOf(b), by_b, residual);
-    if (BlockOf(a) < BlockOf(b)) {
+    const Matrix<m, kTangentOf<Pose, A>> by_a = jacobian.template leftCols<kTangentOf<Pose, A>>();
+    const Matrix<m, kTangentOf<Pose, B>> by_b = jacobian.template rightCols<kTangentOf<Pose, B>>();
+    equations_->AddDiagonal(variables_.Block(a), by_a, residual);
+    equations_->AddDiagonal(variables_.Block(b), by_b, residual);
+    if (variables_.Block(a) < variables_.Block(b)) {
       equations_->AddOffDiagonal(*off_diagonal_++, by_a, by_b);
     } else {
       equations_->AddOffDiagonal(*off_diagonal_++, by_b, by_a);

@@ -1,5 +1,6 @@
 #include "dqslam/solver/retraction.h"
 
+#include <algorithm>
 #include <vector>
 
 #include "dqslam/geometry/manifolds.h"
@@ -22,38 +23,36 @@ class Step {
     moved_ = values;
   }
 
-  void MovePose(int pose) {
-    double* result = Reached(pose);
-    Plus<Pose>(&values_[variables_.PoseStart(pose)], TangentOf(pose), result);
-    Pose::Normalize(result);
+  void Move(PoseRow pose) {
+    Plus<Pose>(Before(pose), TangentOf(pose), After(pose));
+    Pose::Normalize(After(pose));
   }
-
-  bool MoveObject(int slot) {
-    const int start = variables_.ObjectStart(slot);
-    return EllipsoidManifold().Plus(&values_[start], TangentOfObject(slot), &moved_[start]);
+  bool Move(ObjectRow object) {
+    return EllipsoidManifold().Plus(Before(object), TangentOf(object), After(object));
   }
-
-  void MovePoseBehind(int previous, int pose) {
-    PlusBehind<Pose>(
-        Moved(previous), &values_[variables_.PoseStart(pose)], TangentOf(pose), Reached(pose));
+  void MoveBehind(PoseRow previous, PoseRow pose) {
+    PlusBehind<Pose>(Moved(previous), Before(pose), TangentOf(pose), After(pose));
   }
-
-  bool MoveObjectBeside(int viewer, int slot) {
-    const int start = variables_.ObjectStart(slot);
-    return PlusBeside<Pose>(Moved(viewer), &values_[start], TangentOfObject(slot), &moved_[start]);
+  bool MoveBeside(PoseRow viewer, ObjectRow object) {
+    return PlusBeside<Pose>(Moved(viewer), Before(object), TangentOf(object), After(object));
   }
 
  private:
-  double* Reached(int pose) { return &moved_[variables_.PoseStart(pose)]; }
-  const double* TangentOfObject(int slot) const { return &step_[variables_.TangentOfObject(slot)]; }
-  const double* TangentOf(int pose) const {
-    static constexpr double kRest[Pose::kTangentSize] = {};
-    return pose < variables_.first_free_pose ? kRest : &step_[variables_.TangentOfPose(pose)];
+  template <typename Row>
+  const double* Before(Row row) const {
+    return &values_[variables_.Start(row)];
   }
-  MovedPose Moved(int pose) const {
-    const int start = variables_.PoseStart(pose);
-    return {&values_[start], TangentOf(pose), &moved_[start]};
+  template <typename Row>
+  double* After(Row row) {
+    return &moved_[variables_.Start(row)];
   }
+  template <typename Row>
+  const double* TangentOf(Row row) const {
+    static constexpr double kRest[kTangentOf<Pose, Row>] = {};
+    const int start = variables_.Tangent(row);
+    return start < 0 ? kRest : &step_[start];
+  }
+  MovedPose Moved(PoseRow pose) { return {Before(pose), TangentOf(pose), After(pose)}; }
 
   const VariableIndex& variables_;
   const VectorXd& values_;
@@ -61,12 +60,11 @@ class Step {
   VectorXd& moved_;
 };
 
-// The last pose to see each object; the first of all where no box has a weight.
-std::vector<int> Viewers(const BoxTable& boxes, const StageTerms& terms) {
-  const VariableIndex& variables = terms.variables;
-  std::vector<int> viewers(variables.num_objects(), variables.first_pose);
+// The last pose to see each object, by row; the first of all where no box has a weight.
+std::vector<int> Viewers(const Graph& graph, const StageTerms& terms) {
+  std::vector<int> viewers(graph.num_objects(), terms.variables.first_pose);
   for (const StageBox& box : terms.boxes) {
-    viewers[variables.slot_of_object[boxes.object[box.row]]] = boxes.pose[box.row];
+    viewers[graph.boxes.object[box.row]] = graph.boxes.pose[box.row];
   }
   return viewers;
 }
@@ -80,12 +78,11 @@ bool Retract(const VariableIndex& variables,
              VectorXd* moved) {
   Step<Pose> steps(variables, values, step, moved);
   for (int pose = variables.first_free_pose; pose < variables.end_pose; ++pose) {
-    steps.MovePose(pose);
+    steps.Move(PoseRow{pose});
   }
-  for (int slot = 0; slot < variables.num_objects(); ++slot) {
-    if (!steps.MoveObject(slot)) return false;
-  }
-  return true;
+  return std::all_of(variables.objects.begin(), variables.objects.end(), [&](int object) {
+    return steps.Move(ObjectRow{object});
+  });
 }
 
 template <typename Pose>
@@ -99,16 +96,15 @@ bool RetractAlongPath(const PreparedGraph& prepared,
   for (int pose = variables.first_free_pose; pose < variables.end_pose; ++pose) {
     const int row = prepared.odometry_into[pose];
     if (row < 0) {
-      steps.MovePose(pose);
+      steps.Move(PoseRow{pose});
     } else {
-      steps.MovePoseBehind(prepared.graph.odometry.from[row], pose);
+      steps.MoveBehind(PoseRow{prepared.graph.odometry.from[row]}, PoseRow{pose});
     }
   }
-  const std::vector<int> viewers = Viewers(prepared.graph.boxes, terms);
-  for (int slot = 0; slot < variables.num_objects(); ++slot) {
-    if (!steps.MoveObjectBeside(viewers[slot], slot)) return false;
-  }
-  return true;
+  const std::vector<int> viewers = Viewers(prepared.graph, terms);
+  return std::all_of(variables.objects.begin(), variables.objects.end(), [&](int object) {
+    return steps.MoveBeside(PoseRow{viewers[object]}, ObjectRow{object});
+  });
 }
 
 #define DQSLAM_INSTANTIATE(Pose)                                                                  \

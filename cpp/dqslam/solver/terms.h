@@ -16,17 +16,20 @@
 #include "dqslam/costs/scene_priors.h"
 #include "dqslam/costs/size_prior.h"
 #include "dqslam/costs/tangent.h"
+#include "dqslam/geometry/jets.h"
 #include "dqslam/solver/stage_terms.h"
 
 namespace dqslam {
 
-/// A block of a term: a row of the state.
-struct PoseRow {
-  int row;
-};
-struct ObjectRow {
-  int row;
-};
+/// The parameters of a block, for Differentiate().
+template <typename Pose>
+PoseParameters<Pose> ParametersOf(PoseRow, const double* values) {
+  return {values};
+}
+template <typename Pose>
+ObjectParameters ParametersOf(ObjectRow, const double* values) {
+  return {values};
+}
 
 /// Calls visit(cost) with the cost of a box, and returns what that returns.
 template <typename Pose, typename Landmark, typename Visit>

@@ -13,20 +13,20 @@ std::vector<int> VariableIndex::BlockSizes() const {
 Eigen::VectorXd VariableIndex::Pack(const State& state) const {
   Eigen::VectorXd values(num_values());
   for (int pose = first_pose; pose < end_pose; ++pose) {
-    values.segment(PoseStart(pose), pose_size) = state.poses.row(pose).transpose();
+    values.segment(Start(PoseRow{pose}), pose_size) = state.poses.row(pose).transpose();
   }
-  for (int slot = 0; slot < num_objects(); ++slot) {
-    values.segment<kLandmarkSize>(ObjectStart(slot)) = state.landmarks.row(objects[slot]);
+  for (const int object : objects) {
+    values.segment<kLandmarkSize>(Start(ObjectRow{object})) = state.landmarks.row(object);
   }
   return values;
 }
 
 void VariableIndex::Unpack(const Eigen::VectorXd& values, State* state) const {
   for (int pose = std::max(first_pose, first_free_pose); pose < end_pose; ++pose) {
-    state->poses.row(pose) = values.segment(PoseStart(pose), pose_size).transpose();
+    state->poses.row(pose) = values.segment(Start(PoseRow{pose}), pose_size).transpose();
   }
-  for (int slot = 0; slot < num_objects(); ++slot) {
-    state->landmarks.row(objects[slot]) = values.segment<kLandmarkSize>(ObjectStart(slot));
+  for (const int object : objects) {
+    state->landmarks.row(object) = values.segment<kLandmarkSize>(Start(ObjectRow{object}));
   }
 }
 

@@ -2,11 +2,24 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <type_traits>
 #include <vector>
 
 #include "dqslam/problem/graph.h"
 
 namespace dqslam {
+
+/// A block of a term: a row of the state.
+struct PoseRow {
+  int row;
+};
+struct ObjectRow {
+  int row;
+};
+
+/// The size of a block's tangent.
+template <typename Pose, typename Row>
+inline constexpr int kTangentOf = std::is_same_v<Row, PoseRow> ? Pose::kTangentSize : kLandmarkSize;
 
 /// Where each pose and object stands in the vector of values, in a step, and among the blocks of
 /// the normal equations.
@@ -22,19 +35,26 @@ struct VariableIndex {
   int num_objects() const { return static_cast<int>(objects.size()); }
 
   /// Places in the vector of values.
-  int PoseStart(int pose) const { return (pose - first_pose) * pose_size; }
-  int ObjectStart(int slot) const { return num_poses() * pose_size + slot * kLandmarkSize; }
-  int num_values() const { return ObjectStart(num_objects()); }
+  int Start(PoseRow pose) const { return (pose.row - first_pose) * pose_size; }
+  int Start(ObjectRow object) const {
+    return num_poses() * pose_size + slot_of_object[object.row] * kLandmarkSize;
+  }
+  int num_values() const { return num_poses() * pose_size + num_objects() * kLandmarkSize; }
 
   /// Blocks of the normal equations; below zero: constant.
-  int PoseBlock(int pose) const { return pose < first_free_pose ? -1 : pose - first_free_pose; }
-  int ObjectBlock(int object) const { return num_free_poses() + slot_of_object[object]; }
+  int Block(PoseRow pose) const {
+    return pose.row < first_free_pose ? -1 : pose.row - first_free_pose;
+  }
+  int Block(ObjectRow object) const { return num_free_poses() + slot_of_object[object.row]; }
   std::vector<int> BlockSizes() const;
 
-  /// Places in a step.
-  int TangentOfPose(int pose) const { return PoseBlock(pose) * tangent_size; }
-  int TangentOfObject(int slot) const {
-    return num_free_poses() * tangent_size + slot * kLandmarkSize;
+  /// Places in a step; below zero: constant.
+  int Tangent(PoseRow pose) const { return Block(pose) * tangent_size; }
+  int Tangent(ObjectRow object) const {
+    return num_free_poses() * tangent_size + slot_of_object[object.row] * kLandmarkSize;
+  }
+  int num_tangents() const {
+    return num_free_poses() * tangent_size + num_objects() * kLandmarkSize;
   }
 
   Eigen::VectorXd Pack(const State& state) const;
