@@ -7,7 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "dqslam/solver/stage.h"
+#include "dqslam/problem/graph.h"
+#include "dqslam/problem/options.h"
 
 namespace dqslam {
 
