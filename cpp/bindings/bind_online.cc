@@ -163,7 +163,7 @@ void BindSession(py::module_& m) {
           "add_map_object",
           [](Session& session,
              const Vector9d& ellipsoid,
-             const online::Matrix9d& covariance,
+             const Matrix9d& covariance,
              double log_size_mean,
              double log_size_sigma) {
             session.AddMapObject(ellipsoid, covariance, {log_size_mean, log_size_sigma});

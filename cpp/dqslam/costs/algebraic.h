@@ -7,6 +7,8 @@
 // the camera's focal plane meets the object.
 #pragma once
 
+#include <array>
+
 #include "dqslam/costs/autodiff_cost.h"
 #include "dqslam/costs/whitening.h"
 #include "dqslam/geometry/ellipsoid.h"

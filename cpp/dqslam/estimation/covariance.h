@@ -6,7 +6,8 @@
 
 #include <vector>
 
-#include "dqslam/solver/stage.h"
+#include "dqslam/problem/graph.h"
+#include "dqslam/problem/options.h"
 
 namespace dqslam {
 

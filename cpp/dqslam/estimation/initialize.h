@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "dqslam/geometry/ellipsoid.h"
+#include "dqslam/problem/graph.h"
 
 namespace dqslam {
 
@@ -14,12 +15,6 @@ struct View {
   Eigen::Matrix4d sqrt_information;  ///< 1 / pixels
   /// Edges that say nothing about where the object ends.
   EdgeFlags truncated = EdgeFlags::Constant(false);
-};
-
-/// Prior on the object's size: semi-axes, log meters.
-struct SizePrior {
-  double log_mean = 0;
-  double log_sigma = 1;
 };
 
 /// The paper's linear fit.  [S&M17] eqs. (9), (10)

@@ -5,7 +5,6 @@
 
 #include "dqslam/problem/graph.h"
 #include "dqslam/problem/options.h"
-#include "dqslam/solver/stage.h"
 
 namespace dqslam {
 
@@ -22,7 +21,7 @@ struct Solution {
 /// Throws std::invalid_argument for bad input and Interrupted when the monitor asks to stop.
 Solution Solve(const Graph& graph,
                const SolveOptions& options,
-               const std::optional<State>& start,
+               const std::optional<State>& start = std::nullopt,
                const Monitor& monitor = nullptr);
 
 }  // namespace dqslam

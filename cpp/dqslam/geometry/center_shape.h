@@ -10,8 +10,6 @@
 
 namespace dqslam::online {
 
-using Matrix9d = Eigen::Matrix<double, 9, 9>;
-
 template <typename T>
 Matrix3<T> ShapeOf(const T* center_shape) {
   Matrix3<T> shape;

@@ -4,10 +4,11 @@
 
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "dqslam/costs/whitening.h"
 #include "dqslam/online/history.h"
-#include "dqslam/problem/graph.h"
+#include "dqslam/online/observations.h"
 
 namespace dqslam::online {
 
@@ -32,6 +33,9 @@ Eigen::Matrix<double, n, n> Whitening(const std::string& table,
     FailAt(table, row, error.what());
   }
 }
+
+/// What a pose saw as rows of a history, for a pose and a number of objects that there are.
+std::vector<Observation> CheckedObservations(const StepObservations& given, int pose, int objects);
 
 /// Odometry as a history keeps it; of a first pose that is known there is no covariance.
 template <typename Pose>

@@ -1,8 +1,7 @@
-// What a pose saw, as a caller gives it, and as a history keeps it.
+// What a caller tells a session: what a pose saw, and later which objects its boxes show.
 #pragma once
 
-#include "dqslam/online/history.h"
-#include "dqslam/problem/graph.h"
+#include "dqslam/geometry/blocks.h"
 
 namespace dqslam::online {
 
@@ -20,8 +19,14 @@ struct StepObservations {
   Eigen::VectorXd log_size_sigma;
 };
 
-/// As rows of a history, for a pose and a number of objects that there are.  Throws
-/// std::invalid_argument naming the table and the row for what is wrong.
-std::vector<Observation> CheckedObservations(const StepObservations& given, int pose, int objects);
+/// Boxes by their rows in the history, and the object each is of now: -1 waits, those from the
+/// number of objects on are new, in order.
+struct NewLabels {
+  IndexVector observation;
+  IndexVector object;
+  RowMatrix ellipsoid;  ///< (m, 9) where the new objects start, log-Cholesky, in the world
+  Eigen::VectorXd log_size_mean;  ///< of the new objects
+  Eigen::VectorXd log_size_sigma;
+};
 
 }  // namespace dqslam::online

@@ -87,8 +87,8 @@ std::vector<Relabeled> Relabel(const NewLabels& given, History<Pose>* history) {
     Object& object = history->objects[row];
     std::sort(come.begin(), come.end());
     std::vector<int> stay, all;
-    const auto is_own = [&](int observation) {
-      return history->observations[observation].object == row;
+    const auto is_own = [&, own = row](int observation) {
+      return history->observations[observation].object == own;
     };
     std::copy_if(
         object.observations.begin(), object.observations.end(), std::back_inserter(stay), is_own);

@@ -5,19 +5,9 @@
 #include <vector>
 
 #include "dqslam/online/history.h"
-#include "dqslam/problem/graph.h"
+#include "dqslam/online/observations.h"
 
 namespace dqslam::online {
-
-/// Boxes by their rows in the history, and the object each is of now: -1 waits, those from the
-/// number of objects on are new, in order.
-struct NewLabels {
-  IndexVector observation;
-  IndexVector object;
-  RowMatrix ellipsoid;  ///< (m, 9) where the new objects start, log-Cholesky, in the world
-  Eigen::VectorXd log_size_mean;  ///< of the new objects
-  Eigen::VectorXd log_size_sigma;
-};
 
 /// An object whose observations have changed.
 struct Relabeled {

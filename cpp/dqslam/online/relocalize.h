@@ -5,7 +5,10 @@
 // until all objects are in front, takes it on; all boxes then judge it.
 #pragma once
 
-#include "dqslam/problem/graph.h"
+#include <vector>
+
+#include "dqslam/geometry/camera.h"
+#include "dqslam/geometry/pose.h"
 
 namespace dqslam::online {
 

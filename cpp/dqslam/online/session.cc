@@ -11,6 +11,7 @@
 #include "dqslam/online/loop_closing.h"
 #include "dqslam/online/merge.h"
 #include "dqslam/online/reinitialize.h"
+#include "dqslam/online/relabel.h"
 #include "dqslam/online/schedule.h"
 #include "dqslam/online/to_graph.h"
 #include "dqslam/online/window.h"

@@ -7,10 +7,10 @@
 #pragma once
 
 #include <memory>
+#include <vector>
 
 #include "dqslam/online/observations.h"
 #include "dqslam/online/options.h"
-#include "dqslam/online/relabel.h"
 #include "dqslam/problem/graph.h"
 
 namespace dqslam::online {

@@ -36,7 +36,13 @@ struct MeasurementTable {
   int size() const { return static_cast<int>(pose.size()); }
 };
 
-/// Gaussian prior on the logarithm of every object's semi-axes [log meters].
+/// Gaussian prior on the logarithm of one object's semi-axes [log meters].
+struct SizePrior {
+  double log_mean = 0;
+  double log_sigma = 1;
+};
+
+/// The same for every object of a graph.
 struct SizePriorTable {
   Eigen::VectorXd log_mean, log_sigma;  ///< one row an object
 };

@@ -1,6 +1,9 @@
 // What a caller may choose.  Every default lives here and nowhere else.
 #pragma once
 
+#include <functional>
+#include <stdexcept>
+
 #include "dqslam/geometry/ellipsoid.h"
 
 namespace dqslam {
@@ -70,6 +73,14 @@ struct SolveOptions {
   int grow_iterations = 10;                  ///< Levenberg-Marquardt steps after each addition
   double grow_tolerance = 1e-2;              ///< function tolerance of these steps
   int grow_min_views = 8;                    ///< boxes an object needs before it is started
+};
+
+/// Called once an iteration; false asks to stop.
+using Monitor = std::function<bool()>;
+
+/// Thrown when a monitor asked to stop.
+struct Interrupted : std::runtime_error {
+  Interrupted() : std::runtime_error("interrupted") {}
 };
 
 }  // namespace dqslam

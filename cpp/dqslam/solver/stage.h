@@ -1,22 +1,12 @@
 // One stage of estimation: some poses, some boxes, one residual, one minimizer.
 #pragma once
 
-#include <functional>
-#include <stdexcept>
 #include <vector>
 
 #include "dqslam/problem/options.h"
 #include "dqslam/problem/prepared.h"
 
 namespace dqslam {
-
-/// Called once an iteration; false asks to stop.
-using Monitor = std::function<bool()>;
-
-/// Thrown when a monitor asked to stop.
-struct Interrupted : std::runtime_error {
-  Interrupted() : std::runtime_error("interrupted") {}
-};
 
 /// Whether a residual is one of the paper's, which only Ceres minimizes.
 inline bool IsAlgebraic(Residual residual) {
