@@ -26,8 +26,8 @@ colors = ["#D55E00", "#E69F00", "#56B4E9", "#0072B2"]
 for row, color in zip(table.motions, colors, strict=True):
     values = np.maximum(row.singular_values, 1e-18)
     axes.semilogy(range(1, 11), values, "o-", color=color, label=row.motion, markersize=4)
-axes.axhspan(1e-18, 1e-15, color="grey", alpha=0.2)
-axes.text(1, 2e-17, "rounding", color="grey")
+axes.axhspan(1e-18, 1e-15, color="gray", alpha=0.2)
+axes.text(1, 2e-17, "rounding", color="gray")
 axes.set(xlabel="singular value", ylabel="over the largest", xticks=range(1, 11))
 axes.legend(frameon=False)
 plt.show()

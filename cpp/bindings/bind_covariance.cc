@@ -17,26 +17,31 @@ void BindCovariance(py::module_& m) {
       .value("POSE", UnderConstrained::Kind::kPose)
       .value("OBJECT", UnderConstrained::Kind::kObject)
       .finalize();
-  under_constrained.def_readonly("kind", &UnderConstrained::kind)
-      .def_readonly("row", &UnderConstrained::row, "Of the pose or the object in the graph.")
-      .def_readonly("parameter", &UnderConstrained::parameter, "Of its tangent.");
-  py::class_<Covariance>(m, "Covariance", "Marginal covariances; the first pose is the gauge.")
-      .def_readonly("poses",
-                    &Covariance::poses,
-                    "In the frames of the poses, shape (n, k * k); NaN where under-constrained.")
-      .def_readonly("objects",
-                    &Covariance::objects,
-                    "Of the landmark parameters, shape (o, 81); NaN where under-constrained.")
+  under_constrained
+      .def_readonly("kind", &UnderConstrained::kind, "Whether it belongs to a pose or an object.")
+      .def_readonly("row", &UnderConstrained::row, "Row of the pose or the object in the graph.")
+      .def_readonly(
+          "parameter", &UnderConstrained::parameter, "Index of the parameter in its tangent.");
+  py::class_<Covariance>(m, "Covariance", "Marginal covariances with the first pose fixed.")
+      .def_readonly(
+          "poses",
+          &Covariance::poses,
+          "Covariances in the frames of the poses, shape (n, k * k); NaN where under-constrained.")
+      .def_readonly(
+          "objects",
+          &Covariance::objects,
+          "Covariances of the landmark parameters, shape (o, 81); NaN where under-constrained.")
       .def_readonly("under_constrained",
                     &Covariance::under_constrained,
-                    "The first such parameter of each pose and object.");
+                    "The first under-constrained parameter of each pose and object that has one.");
   m.def("covariance",
         &ComputeCovariance,
         "graph"_a,
         "options"_a,
         "state"_a,
         py::call_guard<py::gil_scoped_release>(),
-        "Marginal covariances at a state; at the true state, the posterior Cramer-Rao bound.");
+        "Marginal covariances at a state. At the true state they are the posterior Cramer-Rao "
+        "bound.");
   m.def("joint_covariance",
         &ComputeJointCovariance,
         "graph"_a,
@@ -45,24 +50,31 @@ void BindCovariance(py::module_& m) {
         "poses"_a,
         "objects"_a,
         py::call_guard<py::gil_scoped_release>(),
-        "Joint covariance of some poses (k rows each), then objects (9 rows each).");
+        "Joint covariance of some poses and objects: k rows for each pose, then 9 rows for each "
+        "object.");
 
   py::class_<Fit>(m, "Fit", "How well measurements fit an estimate.")
       .def_readonly("odometry_residuals",
                     &Fit::odometry_residuals,
-                    "In sigmas, shape (n, k), one row a step.")
-      .def_readonly("odometry_leverage",
-                    &Fit::odometry_leverage,
-                    "0..1, shape (n, k): 1 where the step alone determines what it measures.")
-      .def_readonly("box_squares", &Fit::box_squares, "Sum over all edges of boxes, in sigmas.")
-      .def_readonly("box_redundancy", &Fit::box_redundancy, "Sum of 1 - leverage over them.");
+                    "Residuals in sigmas, shape (n, k), one row for each step.")
+      .def_readonly(
+          "odometry_leverage",
+          &Fit::odometry_leverage,
+          "Leverages from 0 to 1, shape (n, k); 1 where the step alone determines what it "
+          "measures.")
+      .def_readonly("box_squares",
+                    &Fit::box_squares,
+                    "Sum of the squared residuals of all edges of boxes, in sigmas.")
+      .def_readonly(
+          "box_redundancy", &Fit::box_redundancy, "Sum of 1 - leverage over all edges of boxes.");
   m.def("fit",
         &ComputeFit,
         "graph"_a,
         "options"_a,
         "state"_a,
         py::call_guard<py::gil_scoped_release>(),
-        "Residuals and leverage of odometry and boxes: what variance components come from.");
+        "Residuals and leverage of odometry and boxes, from which variance components are "
+        "estimated.");
 }
 
 }  // namespace dqslam

@@ -11,7 +11,7 @@ using namespace pybind11::literals;
 namespace dqslam {
 namespace {
 
-// Ctrl-C at every iteration: true goes on.
+// Checks for Ctrl-C at every iteration; true continues the solve.
 bool NoSignal() {
   const py::gil_scoped_acquire gil;
   return PyErr_CheckSignals() == 0;
@@ -24,12 +24,12 @@ Solution SolveFromPython(const Graph& graph,
     const py::gil_scoped_release no_gil;
     return Solve(graph, options, start, NoSignal);
   } catch (const Interrupted&) {
-    throw py::error_already_set();  // what PyErr_CheckSignals left
+    throw py::error_already_set();  // the error that PyErr_CheckSignals has set
   }
 }
 
 void BindEnums(py::module_& m) {
-  py::native_enum<Mode>(m, "Mode", "enum.Enum", "What is unknown.")
+  py::native_enum<Mode>(m, "Mode", "enum.Enum", "Which variables are unknown.")
       .value("SLAM", Mode::kSlam)
       .value("MAPPING", Mode::kMapping)
       .finalize();
@@ -44,13 +44,13 @@ void BindEnums(py::module_& m) {
       .value("DUAL_QUADRIC", LandmarkModel::kDualQuadric)
       .value("ELLIPSOID", LandmarkModel::kEllipsoid)
       .finalize();
-  py::native_enum<Start>(m, "Start", "enum.Enum", "Where an object starts.")
+  py::native_enum<Start>(m, "Start", "enum.Enum", "How an object is started.")
       .value("IDENTITY", Start::kIdentity)
       .value("SVD", Start::kSvd)
       .value("SIZE_PRIOR", Start::kSizePrior)
       .value("SPHERE", Start::kSphere)
       .finalize();
-  py::native_enum<Schedule>(m, "Schedule", "enum.Enum", "In which order poses are added.")
+  py::native_enum<Schedule>(m, "Schedule", "enum.Enum", "The order in which poses are added.")
       .value("BATCH", Schedule::kBatch)
       .value("GROW", Schedule::kGrow)
       .finalize();
@@ -63,7 +63,7 @@ void BindEnums(py::module_& m) {
       .value("GNC_TLS", Loss::kGncTls)
       .value("GNC_GM", Loss::kGncGm)
       .finalize();
-  py::native_enum<Backend>(m, "Backend", "enum.Enum", "Who carries out the steps.")
+  py::native_enum<Backend>(m, "Backend", "enum.Enum", "The solver that minimizes.")
       .value("NATIVE", Backend::kNative)
       .value("CERES", Backend::kCeres)
       .finalize();
@@ -74,92 +74,121 @@ void BindEnums(py::module_& m) {
 }
 
 void BindOptions(py::module_& m) {
-  py::class_<SolveOptions>(m, "SolveOptions", "What a caller may choose.")
+  py::class_<SolveOptions>(m, "SolveOptions", "Options of solve.")
       .def(py::init([](const py::kwargs& values) {
              py::object options = py::cast(SolveOptions());
              for (const auto& [name, value] : values) py::setattr(options, name, value);
              return options.cast<SolveOptions>();
            }),
-           "Any of the attributes as keywords.")
-      .def_readwrite("mode", &SolveOptions::mode)
-      .def_readwrite("residual", &SolveOptions::residual)
-      .def_readwrite("landmark_model", &SolveOptions::landmark_model)
-      .def_readwrite("start", &SolveOptions::start)
-      .def_readwrite("schedule", &SolveOptions::schedule)
-      .def_readwrite("loss", &SolveOptions::loss)
+           "Set any of the attributes by keywords; the others have their defaults.")
+      .def_readwrite("mode",
+                     &SolveOptions::mode,
+                     "SLAM estimates poses and objects; MAPPING keeps the poses fixed.")
+      .def_readwrite("residual", &SolveOptions::residual, "The residual of the boxes.")
       .def_readwrite(
-          "loss_scale", &SolveOptions::loss_scale, "Of Huber and Cauchy, sigmas of a whole box.")
-      .def_readwrite("outlier_chi_square",
-                     &SolveOptions::outlier_chi_square,
-                     "Of the other losses: a box beyond it is an outlier (4 dof).")
+          "landmark_model", &SolveOptions::landmark_model, "The parametrization of the objects.")
+      .def_readwrite("start", &SolveOptions::start, "The method by which objects are started.")
+      .def_readwrite("schedule",
+                     &SolveOptions::schedule,
+                     "BATCH adds all poses at once; GROW adds a few poses at a time.")
+      .def_readwrite("loss", &SolveOptions::loss, "The robust loss on whole boxes.")
+      .def_readwrite("loss_scale",
+                     &SolveOptions::loss_scale,
+                     "Scale of the HUBER and CAUCHY losses, in sigmas of a whole box.")
+      .def_readwrite(
+          "outlier_chi_square",
+          &SolveOptions::outlier_chi_square,
+          "A box is an outlier if its chi-square (4 degrees of freedom) exceeds this; it "
+          "is the threshold of all robust losses but HUBER and CAUCHY.")
       .def_readwrite("algebraic_sigma",
                      &SolveOptions::algebraic_sigma,
-                     "Of both algebraic residuals, in their own unit.")
+                     "Sigma of both algebraic residuals, in the unit of the residual.")
       .def_readwrite("backend",
                      &SolveOptions::backend,
-                     "NATIVE: normal equations in blocks, boxes differentiated by hand; CERES: "
-                     "ceres::Solve on AutoDiff costs, slower, a second opinion.")
-      .def_readwrite("minimizer", &SolveOptions::minimizer, "Of the last stage.")
-      .def_readwrite("max_iterations", &SolveOptions::max_iterations, "Of each batch stage.")
+                     "NATIVE is this library's solver, which leaves algebraic residuals, dual "
+                     "quadrics and switchable constraints to Ceres; CERES minimizes everything "
+                     "with Ceres on AutoDiff costs, which is slower.")
+      .def_readwrite("minimizer", &SolveOptions::minimizer, "The minimizer of the last stage.")
+      .def_readwrite("max_iterations",
+                     &SolveOptions::max_iterations,
+                     "The largest number of iterations of each batch stage.")
       .def_readwrite("function_tolerance",
                      &SolveOptions::function_tolerance,
-                     "Stop when |change of cost| / cost falls below.")
-      .def_readwrite("grow_poses", &SolveOptions::grow_poses, "Poses added at a time, or more:")
+                     "A batch stage stops when |change of cost| / cost is at most this.")
+      .def_readwrite("grow_poses",
+                     &SolveOptions::grow_poses,
+                     "GROW adds at least this number of poses at a time.")
       .def_readwrite("grow_rotation",
                      &SolveOptions::grow_rotation,
-                     "While the sigma of odometry's rotation over them is below, radians.")
+                     "GROW adds more than grow_poses poses as long as the sigma of odometry's "
+                     "rotation over the added poses is at most this, in radians.")
       .def_readwrite("grow_iterations",
                      &SolveOptions::grow_iterations,
-                     "Levenberg-Marquardt steps after each addition.")
-      .def_readwrite(
-          "grow_tolerance", &SolveOptions::grow_tolerance, "Function tolerance of these steps.")
+                     "The largest number of Levenberg-Marquardt iterations after each addition.")
+      .def_readwrite("grow_tolerance",
+                     &SolveOptions::grow_tolerance,
+                     "The minimization after an addition stops when |change of cost| / cost is at "
+                     "most this.")
       .def_readwrite("grow_min_views",
                      &SolveOptions::grow_min_views,
-                     "Boxes an object needs before it is started.");
+                     "GROW starts an object when it has this number of boxes; the last addition "
+                     "starts all objects.");
 }
 
 void BindSolution(py::module_& m) {
-  py::class_<State>(m, "State", "Poses and landmark parameters: where a solve starts.")
+  py::class_<State>(m, "State", "Poses and landmark parameters at which a solve can start.")
       .def(py::init<RowMatrix, RowMatrix>(),
            "poses"_a,
            "landmarks"_a,
            "Poses (n, d) and landmark parameters (o, 9).")
-      .def_readonly("poses", &State::poses, "Shape (n, d).")
-      .def_readonly("landmarks", &State::landmarks, "Shape (o, 9).");
+      .def_readonly("poses", &State::poses, "Poses, shape (n, d).")
+      .def_readonly("landmarks", &State::landmarks, "Landmark parameters, shape (o, 9).");
   py::class_<Summary>(m, "Summary", "How a solve went.")
       .def_readonly("initial_cost",
                     &Summary::initial_cost,
-                    "Half the sum of squared residuals, in sigmas, after the loss.")
-      .def_readonly("final_cost", &Summary::final_cost, "Likewise.")
-      .def_readonly("iterations", &Summary::iterations, "Of all stages.")
-      .def_readonly("rejected_steps", &Summary::rejected_steps, "Of all stages.")
+                    "Half the sum of squared residuals, in sigmas and after the loss, at the start "
+                    "of the first stage.")
+      .def_readonly("final_cost",
+                    &Summary::final_cost,
+                    "Half the sum of squared residuals, in sigmas and after the loss, at the end "
+                    "of the last stage.")
+      .def_readonly("iterations", &Summary::iterations, "Number of iterations of all stages.")
+      .def_readonly(
+          "rejected_steps", &Summary::rejected_steps, "Number of rejected steps of all stages.")
       .def_readonly("gradient_norm_start",
                     &Summary::gradient_norm_start,
-                    "Infinity norm at the start of the last stage.")
-      .def_readonly("gradient_norm_end", &Summary::gradient_norm_end, "Likewise at its end.")
-      .def_readonly("seconds", &Summary::seconds, "Wall clock, all stages.")
-      .def_readonly(
-          "start_seconds", &Summary::start_seconds, "Of these, until all objects had a start.")
+                    "Infinity norm of the gradient at the start of the last stage.")
+      .def_readonly("gradient_norm_end",
+                    &Summary::gradient_norm_end,
+                    "Infinity norm of the gradient at the end of the last stage.")
+      .def_readonly("seconds", &Summary::seconds, "Wall-clock time of all stages in seconds.")
+      .def_readonly("start_seconds",
+                    &Summary::start_seconds,
+                    "The part of `seconds` until all objects had a start.")
       .def_readonly("evaluation_seconds",
                     &Summary::evaluation_seconds,
-                    "Of all stages: residuals and their derivatives.")
+                    "Time for residuals and their derivatives in all stages, in seconds.")
       .def_readonly("linear_solver_seconds",
                     &Summary::linear_solver_seconds,
-                    "Of all stages: orderings, factorizations and solutions.")
+                    "Time to order, factorize and solve linear systems in all stages, in seconds.")
       .def_readonly("converged",
                     &Summary::converged,
-                    "The last stage met a stopping test and accepted a step.")
-      .def_readonly("message", &Summary::message, "How it ended, in words.")
+                    "Whether the last stage met a stopping test and accepted a step.")
+      .def_readonly("message", &Summary::message, "The reason why the last stage ended.")
       .def("__str__", &ToString);
-  py::class_<Solution>(m, "Solution", "The answer of solve.")
-      .def_readonly("poses", &Solution::poses, "Shape (n, d).")
-      .def_readonly("landmarks", &Solution::landmarks, "Parameters of the model, shape (o, 9).")
-      .def_readonly("dual_quadrics", &Solution::dual_quadrics, "q1 .. q9, shape (o, 9).")
-      .def_readonly("svd_singular_values",
-                    &Solution::svd_singular_values,
-                    "Of each object's SVD start, shape (o, 10), descending; NaN where not used.")
-      .def_readonly("inliers", &Solution::inliers, "Boxes that fit their objects, shape (b,).")
-      .def_readonly("summary", &Solution::summary);
+  py::class_<Solution>(m, "Solution", "The result of solve.")
+      .def_readonly("poses", &Solution::poses, "Poses, shape (n, d).")
+      .def_readonly(
+          "landmarks", &Solution::landmarks, "Parameters in the landmark model, shape (o, 9).")
+      .def_readonly(
+          "dual_quadrics", &Solution::dual_quadrics, "q1 .. q9 of each object, shape (o, 9).")
+      .def_readonly(
+          "svd_singular_values",
+          &Solution::svd_singular_values,
+          "Singular values of each object's SVD start, shape (o, 10), descending; NaN where the "
+          "SVD was not used.")
+      .def_readonly("inliers", &Solution::inliers, "Whether each box fits its object, shape (b,).")
+      .def_readonly("summary", &Solution::summary, "How the solve went.");
 }
 
 }  // namespace
@@ -173,8 +202,8 @@ void BindSolve(py::module_& m) {
         "graph"_a,
         py::arg_v("options", SolveOptions(), "SolveOptions()"),
         "start"_a = std::nullopt,
-        "Solve a graph, from its odometry or from a given start. Releases the GIL; Ctrl-C raises "
-        "KeyboardInterrupt; ValueError for bad input.");
+        "Solve a graph, from its odometry or from a given start. Bad input raises ValueError. The "
+        "GIL is released; Ctrl-C raises KeyboardInterrupt.");
 }
 
 }  // namespace dqslam

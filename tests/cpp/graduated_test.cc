@@ -40,7 +40,7 @@ TEST(DcsLoss, DerivativesMatchDifferences) {
 }
 
 // At the best switch w = phi / (phi + s), the cost is phi s / (phi + s).
-TEST(SwitchedCost, MinimisesToGemanMcClure) {
+TEST(SwitchedCost, MinimizesToGemanMcClure) {
   const Scene scene = MakeScene<Se2>();
   constexpr double kPhi = 13.28;
   using Box = BoxCost<Se2, EllipsoidModel>;

@@ -64,7 +64,7 @@ def test_the_noise_of_a_step_in_space_by_hand(tmp_path):
 
 @pytest.mark.parametrize(("scenario", "seed"), [("orbit", 1), ("honest_orbit", 4)])
 def test_in_space_the_files_give_the_estimate_of_the_recording(tmp_path, scenario, seed):
-    """To a millimeter, where odometry is decimetres off; the files have no relative positions."""
+    """To a millimeter, where odometry is decimeters off; the files have no relative positions."""
     recording, truth, loaded, _ = written(tmp_path, scenario, seed)
     estimate, _ = solve(build_graph(replace(recording, positions=None)))
     again, _ = solve(build_graph(loaded))

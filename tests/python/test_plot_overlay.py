@@ -15,7 +15,7 @@ from dqslam.evaluation import fit_boxes
 from dqslam.plot.overlay import Overlay, save_stills, save_video, usual_rate
 
 SIZE = (planted.CAMERA.width, planted.CAMERA.height)
-GREY = (128, 128, 128)
+GRAY = (128, 128, 128)
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +28,7 @@ def images(tmp_path_factory):
     """Return an even image for each of three poses."""
     folder = tmp_path_factory.mktemp("images")
     for pose in (0, 4, 9):
-        Image.new("RGB", SIZE, GREY).save(folder / f"{pose:04}.png")
+        Image.new("RGB", SIZE, GRAY).save(folder / f"{pose:04}.png")
     return {pose: folder / f"{pose:04}.png" for pose in (0, 4, 9)}
 
 
@@ -67,9 +67,9 @@ def test_pixels_of_the_outline_are_painted(tmp_path, results, images):
     outline = _outline(results, 9, 14)
     for at in outline[::16]:
         u, v = np.round(at).astype(int)
-        assert np.abs(pixels[v, u] - GREY).max() > 20
+        assert np.abs(pixels[v, u] - GRAY).max() > 20
     inside = fits.predicted[row].reshape(2, 2).mean(axis=0).round().astype(int)
-    np.testing.assert_array_equal(pixels[inside[1], inside[0]], GREY)
+    np.testing.assert_array_equal(pixels[inside[1], inside[0]], GRAY)
 
 
 def _outline(results, pose, number):
@@ -176,8 +176,8 @@ def test_what_is_no_image_is_named(tmp_path, results):
 
 
 def test_a_grey_image_stays_grey(tmp_path, results):
-    Image.new("L", SIZE, 77).save(tmp_path / "grey.png")
-    (path,) = save_stills(Overlay(results, None), {0: tmp_path / "grey.png"}, tmp_path / "out")
+    Image.new("L", SIZE, 77).save(tmp_path / "gray.png")
+    (path,) = save_stills(Overlay(results, None), {0: tmp_path / "gray.png"}, tmp_path / "out")
     pixels = np.asarray(Image.open(path).convert("RGB"))
     np.testing.assert_array_equal(pixels[2, 2], [77, 77, 77])
 

@@ -1,10 +1,10 @@
 // The paper's box residual:  r_k = l_k^T P Q* P^T l_k / sigma for the four lines of the box,
 // l_k = x_a cross x_b of neighboring corners in homogeneous pixels.   [S&M17] eqs. (5), (7)
-// Normalized: divided by (P Q* P^T)_33, which the paper leaves at its value of p_z^2 - S_zz.
+// The normalized residual is divided by (P Q* P^T)_33 = p_z^2 - S_zz; the paper does not divide.
 //
 // Blocks: world_from_robot [d], landmark [9].  Residual: [4], in sigmas.
-// Raw: never fails.  Normalized: returns false where (P Q* P^T)_33 is not positive, that is where
-// the camera's focal plane meets the object.
+// The residual as published never fails.  The normalized one returns false where (P Q* P^T)_33 is
+// not positive, that is, where the camera's focal plane meets the object.
 #pragma once
 
 #include <array>
@@ -15,7 +15,8 @@
 
 namespace dqslam {
 
-/// K^T l for the left, top, right and bottom line of a box: plane normals in the camera frame.
+/// K^T l for the left, top, right and bottom line of a box.  These are the normals, in the camera
+/// frame, of the planes through the camera and the lines.
 inline std::array<Eigen::Vector3d, 4> BoxLines(const Camera& camera, const Eigen::Vector4d& box) {
   Eigen::Matrix3d K;
   K << camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, 1;

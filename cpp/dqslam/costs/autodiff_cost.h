@@ -9,13 +9,13 @@ template <typename Functor, int kResiduals, int... kBlockSizes>
 struct AutoDiffCost {
   static constexpr int kResidualSize = kResiduals;
 
-  /// A Ceres cost function around Functor{members...}, in their order.  The caller owns it.
+  /// Makes a Ceres cost function around Functor{members...}.  The caller owns it.
   template <typename... Members>
   static ceres::CostFunction* Create(const Members&... members) {
     return CreateFrom(Functor{{}, members...});
   }
 
-  /// The same around a copy of a functor.
+  /// Makes a Ceres cost function around a copy of a functor.  The caller owns it.
   static ceres::CostFunction* CreateFrom(const Functor& functor) {
     return new ceres::AutoDiffCostFunction<Functor, kResiduals, kBlockSizes...>(
         new Functor(functor));

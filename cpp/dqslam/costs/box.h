@@ -1,9 +1,11 @@
-// Detection against the projected ellipsoid:  r = W (box(C*) - observed),  C* = P Q* P^T.
-// [S&M17] sec. 3.3, with the exact bounding box of the outline.
+// Difference between the box of the projected ellipsoid and the detected box:
+//   r = W (box(C*) - observed),  C* = P Q* P^T.
+// See [S&M17] sec. 3.3; here the bounding box of the outline is exact.
 //
 // Blocks: world_from_robot [d], landmark [9].  Residual: [4], in sigmas.
-// Edges flagged one_sided count only where the prediction ends inside the observed edge.
-// Returns false, so that Ceres rejects the step, unless the object is strictly in front.
+// An edge flagged one_sided counts only where the predicted edge is inside the observed one.
+// The cost returns false, so that Ceres rejects the step, unless the object is strictly in front of
+// the camera.
 #pragma once
 
 #include "dqslam/costs/autodiff_cost.h"

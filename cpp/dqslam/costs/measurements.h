@@ -1,7 +1,7 @@
-// The kinds of measurements between a pose and an object, beside boxes.  A kind is a cost with
-// blocks world_from_robot [d] and landmark [9], a name, and two members: what was measured, and the
-// square root of its information.  A cost that is added to this list works in batch, in Ceres, in
-// covariances and in sessions.
+// The kinds of measurements between a pose and an object, other than boxes.  A kind is a cost with
+// the blocks world_from_robot [d] and landmark [9], a name, and two members: the measured value and
+// the square root of its information.  A cost that is added to this list works in batch, in Ceres,
+// in covariances and in sessions.
 #pragma once
 
 #include <string>
@@ -19,13 +19,13 @@ using MeasurementCosts =
 inline constexpr int kNumMeasurementKinds =
     std::tuple_size_v<MeasurementCosts<Se2, EllipsoidModel>>;
 
-/// Names the type of a cost to a visitor.
+/// Carries the type of a cost to a visitor.
 template <typename Cost_>
 struct MeasurementTag {
   using Cost = Cost_;
 };
 
-/// Calls visit(MeasurementTag<Cost>{}) with the cost of a kind, a number of the list.
+/// Calls visit(MeasurementTag<Cost>{}) with the cost of a kind, which is an index into the list.
 template <typename Pose, typename Landmark, int kFirst = 0, typename Visit>
 auto VisitMeasurementKind(int kind, Visit&& visit) {
   using Costs = MeasurementCosts<Pose, Landmark>;
@@ -36,7 +36,7 @@ auto VisitMeasurementKind(int kind, Visit&& visit) {
   return visit(Tag{});
 }
 
-/// How many numbers a measurement of a kind has.
+/// The number of values in one measurement of a kind.
 inline int MeasurementSize(int kind) {
   return VisitMeasurementKind<Se2, EllipsoidModel>(
       kind, [](auto tag) { return decltype(tag)::Cost::kResidualSize; });
@@ -47,7 +47,7 @@ inline const char* MeasurementName(int kind) {
       kind, [](auto tag) { return decltype(tag)::Cost::kName; });
 }
 
-/// The number of the kind of that name; -1 where there is none.
+/// The index of the kind with that name, or -1 if there is none.
 inline int MeasurementKind(const std::string& name) {
   for (int kind = 0; kind < kNumMeasurementKinds; ++kind) {
     if (name == MeasurementName(kind)) return kind;
@@ -55,8 +55,9 @@ inline int MeasurementKind(const std::string& name) {
   return -1;
 }
 
-/// Square root of the information of one measurement, from its covariance; both square, row by row.
-/// Throws std::invalid_argument for a covariance that is not positive definite.
+/// Square root of the information of one measurement, from its covariance.  Both are square
+/// matrices, stored row by row.  Throws std::invalid_argument for a covariance that is not positive
+/// definite.
 inline RowMatrix MeasurementSqrtInformation(int kind, const double* covariance) {
   return VisitMeasurementKind<Se2, EllipsoidModel>(kind, [&](auto tag) -> RowMatrix {
     constexpr int m = decltype(tag)::Cost::kResidualSize;
@@ -65,8 +66,8 @@ inline RowMatrix MeasurementSqrtInformation(int kind, const double* covariance) 
   });
 }
 
-/// The cost of one measurement: m numbers, and the m x m square root of their information, row by
-/// row.
+/// The cost of one measurement of m values.  `sqrt_information` is the m x m square root of their
+/// information, stored row by row.
 template <typename Cost>
 Cost MakeMeasurementCost(const double* value, const double* sqrt_information) {
   constexpr int m = Cost::kResidualSize;

@@ -2,7 +2,7 @@
 //
 // Blocks: from [d], to [d], both world_from_robot.  Residual: [k], in sigmas.  Never fails.
 // u_i is a relative pose, to_in_from.  The paper's motion model f(x, (v, omega)) in SE(2) drives v
-// forward and then turns by omega: the relative pose (v, 0, omega).
+// forward and then turns by omega, which is the relative pose (v, 0, omega).
 #pragma once
 
 #include "dqslam/costs/autodiff_cost.h"

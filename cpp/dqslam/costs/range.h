@@ -1,8 +1,8 @@
-// Measured distance from the robot to an object's center, as a radio tag gives it:
+// Measured distance from the robot to an object's center, for example from a radio tag:
 //   r = W (|c - t| - range)
 //
 // Blocks: world_from_robot [d], landmark [9].  Residual: [1], in sigmas.
-// Returns false within 1 mm of the center, where the distance has no derivative.
+// Returns false within 1 mm of the center, because the distance has no derivative at the center.
 #pragma once
 
 #include <cmath>

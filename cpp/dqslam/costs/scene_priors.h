@@ -1,11 +1,12 @@
-// What is known of a scene beside its boxes: objects that stand upright, on a plane, and the height
-// of the camera above that plane {x : n.x + d = 0}, n the unit normal that points up.
+// Knowledge of a scene beyond its boxes: objects stand upright, objects stand on a plane, and the
+// camera has a known height above that plane {x : n.x + d = 0}, where the unit normal n points up.
 //
-//   UprightCost        r = cross(n, S n) / (n^T S n sigma)     two of three entries are independent
-//                      zero when n is a principal axis of the object; about tilt [rad] times
-//                      (1 - ratio of squared semi-axes) for a small tilt
-//   SupportPlaneCost   r = (n.c + d - |L^T n|) / sigma          the lowest point lies on the plane
-//   CameraHeightCost   r = (n.camera + d - height) / sigma
+//   UprightCost        r = cross(n, S n) / (n^T S n sigma).  It is zero when n is a principal axis
+//                      of the object.  For a small tilt [rad] it is about the tilt times (1 - ratio
+//                      of squared semi-axes).  Two of its three entries are independent.
+//   SupportPlaneCost   r = (n.c + d - |L^T n|) / sigma.  It is zero when the object's lowest point
+//                      lies on the plane.
+//   CameraHeightCost   r = (n.camera + d - height) / sigma.
 //
 // Blocks: ellipsoid [9]; ellipsoid [9]; world_from_robot [d].  Residuals: [3], [1], [1], in sigmas.
 // None of them fails.

@@ -1,10 +1,10 @@
-// Broad prior on the size:  r = (log(S) / 2 - log_mean I) / log_sigma, as a 6-vector whose norm is
-// that of the matrix.  With semi-axes a_i:  |r|^2 = sum_i (log a_i - log_mean)^2 / log_sigma^2, for
+// Broad prior on the size:  r = (log(S) / 2 - log_mean I) / log_sigma, as a 6-vector with the same
+// norm as the matrix.  With semi-axes a_i:  |r|^2 = sum_i (log a_i - log_mean)^2 / log_sigma^2, for
 // any orientation of the object and of the world frame.
 //
 // Blocks: ellipsoid [9].  Residual: [6], in sigmas.
-// Returns false where the ratio of the longest to the shortest semi-axis exceeds 10^5: such a disc
-// or needle is a step gone wrong, and its eigenvalues have no digits left.
+// Returns false where the ratio of the longest to the shortest semi-axis exceeds 10^5.  Such a disc
+// or needle comes from a bad step, and its eigenvalues have no accurate digits left.
 #pragma once
 
 #include <ceres/jet.h>
@@ -17,10 +17,11 @@
 
 namespace dqslam {
 
-/// Largest ratio of eigenvalues, that is of squared semi-axes, whose logarithm is accurate.
+/// Largest ratio of eigenvalues for which their logarithms are accurate.  Eigenvalues are squared
+/// semi-axes.
 inline constexpr double kMaxEigenvalueRatio = 1e10;
 
-/// Matrix logarithm of a symmetric positive definite matrix; false for any other.
+/// Matrix logarithm of a symmetric positive definite matrix.  Returns false for any other matrix.
 inline bool LogSymmetric(const Matrix3<double>& S, Matrix3<double>* log) {
   const Eigen::SelfAdjointEigenSolver<Matrix3<double>> eigen(S);
   if (!(eigen.eigenvalues()[0] * kMaxEigenvalueRatio > eigen.eigenvalues()[2])) return false;
@@ -29,8 +30,9 @@ inline bool LogSymmetric(const Matrix3<double>& S, Matrix3<double>* log) {
   return true;
 }
 
-/// The same with derivatives, by the Daleckii-Krein theorem: in the eigenbasis, the derivative of
-/// entry (i, j) is scaled by (log a - log b) / (a - b), or 1 / a where a = b.
+/// Matrix logarithm with derivatives, by the Daleckii-Krein theorem.  In the eigenbasis, the
+/// derivative of entry (i, j) is scaled by (log a_i - log a_j) / (a_i - a_j), or by 1 / a_i where
+/// a_i = a_j.
 template <int N>
 bool LogSymmetric(const Matrix3<ceres::Jet<double, N>>& S, Matrix3<ceres::Jet<double, N>>* log) {
   Matrix3<double> value;

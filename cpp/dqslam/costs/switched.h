@@ -1,8 +1,8 @@
-// Switchable constraints, Suenderhauf & Protzel 2012:  r = (w e, (1 - w) sqrt(phi)), with e the
-// residual of a box and phi the chi-square from which on it is doubted.
+// Switchable constraints, Suenderhauf & Protzel 2012:  r = (w e, (1 - w) sqrt(phi)), where e is the
+// residual of a box and phi is the chi-square above which the box is doubted.
 //
-// Blocks: those of the box cost, and the switch w [1].  Residual: [5].  Fails where the box cost
-// does.
+// Blocks: those of the box cost, and the switch w [1].  Residual: [5].  Returns false where the box
+// cost does.
 #pragma once
 
 #include "dqslam/costs/autodiff_cost.h"

@@ -1,14 +1,16 @@
 // Signed distance of the ellipsoid to the plane behind each edge of the box:
 //   r_k = (n_k . p + |L^T n_k|) focal / depth,   n = (1, 0, -x) for the right edge, and so on.
-// The algebraic residual of [S&M17] eq. (5) is (n.p + h)(n.p - h), h = |L^T n|: this is the factor
-// that vanishes where the plane touches the object from *outside the box*; the other one vanishes
-// on the object's far side.
+// The algebraic residual of [S&M17] eq. (5) is (n.p + h)(n.p - h) with h = |L^T n|.  The residual
+// here is its first factor, which vanishes where the plane touches the object from *outside the
+// box*.  The second factor vanishes where the plane touches the object's far side.
 //
 // Blocks: world_from_robot [d], landmark [9].  Residual: [4], in sigmas.
 // The scale focal / depth turns meters into pixels; `depth` is frozen while a stage runs.
-// Edges flagged one_sided count only where the object ends inside the box.
-// Affine in the center and defined everywhere for ellipsoids: behind, beside and inside too.
-// Returns false where n^T S n is not positive (only a dual quadric that is no ellipsoid).
+// An edge flagged one_sided counts only where the object ends inside the box.
+// The residual is affine in the center and is defined for every ellipsoid, also for one that is
+// behind or beside the camera, or around it.
+// Returns false where n^T S n is not positive, which happens only for a dual quadric that is not an
+// ellipsoid.
 #pragma once
 
 #include "dqslam/costs/autodiff_cost.h"

@@ -1,4 +1,4 @@
-// Square root information: the one place where residuals are scaled.
+// Square root information.  Residuals are scaled here and nowhere else.
 //
 //   r = W e,  W^T W = covariance^-1,  so that r^T r is the squared Mahalanobis distance of e.
 //
@@ -13,8 +13,8 @@
 namespace dqslam {
 
 /// W with W^T W = covariance^-1.  Throws std::invalid_argument unless the covariance is finite,
-/// symmetric and positive definite by a margin over rounding; the margin is that of the correlation
-/// matrix, so units do not matter.
+/// symmetric and positive definite by a margin over rounding.  The margin is tested on the
+/// correlation matrix, so units do not matter.
 template <int kSize>
 Eigen::Matrix<double, kSize, kSize> SqrtInformation(
     const Eigen::Matrix<double, kSize, kSize>& covariance) {

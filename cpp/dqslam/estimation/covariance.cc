@@ -10,12 +10,13 @@
 namespace dqslam {
 namespace {
 
-// A variance this many times the one that it would have if all else were known comes from rounding.
+// A parameter counts as undetermined if its variance is this many times the variance that it would
+// have if all others were known.  Such a value comes from rounding only.
 constexpr double kUndetermined = 1e9;
 
 using RowMajorSparse = Eigen::SparseMatrix<double, Eigen::RowMajor>;
 
-// Variance of a residual as the estimate predicts it: its row of J H^-1 J^T.
+// The leverage of a residual: its diagonal entry of J H^-1 J^T.
 double Leverage(const RowMajorSparse& J, int row, const SelectedInverse& inverse) {
   double leverage = 0;
   for (RowMajorSparse::InnerIterator a(J, row); a; ++a) {
@@ -26,7 +27,7 @@ double Leverage(const RowMajorSparse& J, int row, const SelectedInverse& inverse
   return leverage;
 }
 
-// Columns of some blocks of the information matrix; none of a fixed pose.
+// Columns of some poses and objects in the information matrix; -1 for those of a fixed pose.
 std::vector<int> ColumnsOf(const Information& information,
                            const Graph& graph,
                            const std::vector<int>& poses,
@@ -127,7 +128,7 @@ Fit ComputeFit(const Graph& graph, const SolveOptions& options, const State& sta
   }
   for (const int end = row + 4 * information.num_boxes; row < end; ++row) {
     const double leverage = Leverage(J, row, inverse);
-    if (leverage == 0) continue;  // an edge that the image cut, and the object reaches it
+    if (leverage == 0) continue;  // The border cut this edge, and the object extends to it.
     fit.box_squares += information.residuals[row] * information.residuals[row];
     fit.box_redundancy += 1 - leverage;
   }

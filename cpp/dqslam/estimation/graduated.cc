@@ -8,13 +8,13 @@
 namespace dqslam {
 namespace {
 
-constexpr double kGraduation = 1.6;     // of the control parameter, each round
-constexpr double kLargestAtStart = 10;  // chi-square, in thresholds
+constexpr double kGraduation = 1.6;     // the factor of the control parameter in each round
+constexpr double kLargestAtStart = 10;  // chi-square, in units of the threshold
 constexpr int kMaxRounds = 60;
 constexpr int kRoundIterations = 15;
 
 // Weight of a box with chi-square s at threshold c2, for control parameter mu (Yang 2020, eqs. 12
-// and 14; for Geman-McClure mu falls to 1, for truncated least squares it rises).
+// and 14).  For Geman-McClure mu decreases to 1, for truncated least squares it increases.
 double Weight(Loss loss, double s, double c2, double mu) {
   if (std::isinf(s)) return 0;
   if (loss == Loss::kGncGm) return std::pow(mu * c2 / (s + mu * c2), 2);
@@ -46,9 +46,9 @@ Summary GraduateNonConvexity(const PreparedGraph& prepared,
   stage.function_tolerance = options.grow_tolerance;
   stage.weights.assign(stage.boxes.size(), 1.0);
 
-  // Yang et al. start where the surrogate is convex over all residuals; a state that was grown with
-  // a robust loss is better than the all-inlier fit which that leads to, so it keeps its far
-  // outliers out from the first round on.
+  // Yang et al. start with a surrogate that is convex over all residuals, which leads to a fit of
+  // all boxes.  A state that was grown with a robust loss is better than that fit.  The first round
+  // therefore already leaves out the boxes that are far from it.
   const double largest = kLargestAtStart * c2;
   double mu = truncated ? c2 / (2 * largest - c2) : 2 * largest / c2;
   Summary total;
@@ -64,7 +64,7 @@ Summary GraduateNonConvexity(const PreparedGraph& prepared,
     if (truncated ? decided && round > 0 : mu <= 1) break;
     mu = truncated ? mu * kGraduation : std::max(mu / kGraduation, 1.0);
   }
-  // The final problem: inliers only, to the end.
+  // The final stage uses the inliers only and runs until it converges.
   const std::vector<bool> inliers = InlierBoxes(prepared, options, *state);
   for (size_t i = 0; i < stage.boxes.size(); ++i) stage.weights[i] = inliers[stage.boxes[i]];
   stage.minimizer = options.minimizer;

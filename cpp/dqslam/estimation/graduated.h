@@ -1,18 +1,20 @@
-// Wrong associations: which boxes belong to their objects, and estimation that is not led astray.
+// Wrong associations: which boxes fit their objects, and estimation that is robust to the others.
 #pragma once
 
 #include "dqslam/solver/stage.h"
 
 namespace dqslam {
 
-/// Whether a loss doubts boxes at all.
+/// Whether a loss is robust, that is, any loss but kNone.
 bool IsRobust(Loss loss);
 
-/// Whether a loss throws boxes out by their chi-square at the state, which must have settled first.
+/// Whether a loss rejects boxes by their chi-square at the state: all robust losses but Huber and
+/// Cauchy.  The state must first have converged with a milder loss.
 bool ThrowsBoxesOut(Loss loss);
 
-/// Graduated non-convexity, Yang et al. 2020, truncated least squares or Geman-McClure, on whole
-/// boxes; odometry is a known inlier.  Starts at the state; weights are 0 or 1 at the end.
+/// Graduated non-convexity, Yang et al. 2020, with truncated least squares or Geman-McClure.  It
+/// weights whole boxes; odometry is a known inlier.  It starts at the state and ends with weights
+/// that are 0 or 1.
 Summary GraduateNonConvexity(const PreparedGraph& prepared,
                              const SolveOptions& options,
                              const Monitor& monitor,

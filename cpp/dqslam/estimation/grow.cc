@@ -7,8 +7,8 @@
 namespace dqslam {
 namespace {
 
-// The end of the poses to add behind `begin`: options.grow_poses of them, and more while the
-// rotation that odometry may have lost since `begin` stays small.
+// The end of the range of poses to add at `begin`.  It has options.grow_poses poses, and more as
+// long as the sigma of odometry's rotation since `begin` is at most options.grow_rotation.
 int EndOfAddition(const PreparedGraph& prepared, const SolveOptions& options, int begin) {
   const OdometryTable& odometry = prepared.graph.odometry;
   const int k = prepared.graph.tangent_size();
@@ -66,7 +66,7 @@ Vector9d StartObject(const PreparedGraph& prepared,
         try {
           return EllipsoidFromDualQuadric(fit.quadric);
         } catch (const std::invalid_argument&) {
-          // no ellipsoid: the sphere instead
+          // The fit is not an ellipsoid: the sphere is used instead.
         }
       }
       break;

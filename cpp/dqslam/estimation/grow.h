@@ -1,4 +1,4 @@
-// Growing: add poses a few at a time, start an object from its first track, minimize, go on.
+// Growing: add a few poses, start the objects that have enough boxes, minimize, and repeat.
 #pragma once
 
 #include <vector>
@@ -8,19 +8,19 @@
 
 namespace dqslam {
 
-/// What the starts need of some boxes of one object.
+/// The views from which an object is started: some of its boxes with their cameras.
 std::vector<View> ViewsOf(const PreparedGraph& prepared,
                           const State& state,
                           const std::vector<int>& boxes);
 
-/// Landmark parameters of an object from some of its boxes, by the start of the options.
+/// Landmark parameters of an object from some of its boxes, by the method options.start.
 Vector9d StartObject(const PreparedGraph& prepared,
                      const SolveOptions& options,
                      const State& state,
                      int object,
                      const std::vector<int>& boxes);
 
-/// Poses and landmarks from odometry alone; every object is started at the end.
+/// Estimates poses and landmarks from the odometry on.  At the end every object has been started.
 Summary Grow(const PreparedGraph& prepared,
              const SolveOptions& options,
              const Monitor& monitor,

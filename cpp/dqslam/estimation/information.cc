@@ -15,7 +15,7 @@ namespace {
 
 using Sparse = Eigen::SparseMatrix<double>;
 
-// Far below what the data say.
+// The damping, relative to the diagonal of H.  It is far below the information of the data.
 constexpr double kDamping = 1e-12;
 
 void CheckState(const Graph& graph, const State& state) {
@@ -40,7 +40,7 @@ Stage StageOfInliers(const PreparedGraph& prepared,
   return stage;
 }
 
-// A visitor of terms that makes the Jacobian of each a group of rows.
+// A visitor that writes the Jacobian of each term as a group of rows.
 template <typename Pose, typename Landmark>
 class JacobianRows {
  public:
@@ -107,7 +107,8 @@ class JacobianRows {
     return true;
   }
 
-  // Columns within a row ascend: a reversed step of odometry has its later pose first.
+  // Columns within a row must ascend, but odometry from a later to an earlier pose has the later
+  // one first.
   template <int m, int kColumns, typename... Rows>
   void Add(const Matrix<m, 1>& residual, const Matrix<m, kColumns>& jacobian, const Rows&... rows) {
     struct Block {
@@ -179,7 +180,7 @@ Information ComputeInformation(const Graph& graph,
   return information;
 }
 
-// J^T J stores every entry of a block whose residuals do; a block of zeros must be stored as well.
+// Every entry of a block of J^T J must be stored, also where it is zero.
 Sparse Damped(const Sparse& H) {
   Sparse damping(H.rows(), H.cols());
   damping.setIdentity();

@@ -10,27 +10,27 @@ namespace dqslam {
 
 /// Columns: the tangents of the free poses in their order, then the parameters of all objects.
 struct Information {
-  Eigen::SparseMatrix<double>
-      jacobian;  ///< of the residuals, in sigmas; of odometry, then boxes, then the rest
+  /// Rows: the residuals of odometry, then of boxes, then of all other terms, in sigmas.
+  Eigen::SparseMatrix<double> jacobian;
   Eigen::SparseMatrix<double> matrix;  ///< H
-  Eigen::VectorXd residuals;
-  std::vector<int> block_sizes;  ///< of the free poses and the objects
+  Eigen::VectorXd residuals;           ///< in sigmas, one for each row of the Jacobian
+  std::vector<int> block_sizes;        ///< columns of each free pose, then of each object
   int first_free_pose = 1;
   int num_free_poses = 0;
-  int num_boxes = 0;  ///< that take part
+  int num_boxes = 0;  ///< the number of boxes among the residuals
 
   /// Column at which the block of a free pose or of an object starts.
   int PoseColumn(int pose) const;
   int ObjectColumn(int object) const;
 };
 
-/// With a robust loss, boxes that are outliers at the state take no part.  Throws
-/// std::invalid_argument for a state that does not fit the graph and std::runtime_error where a
-/// residual of the last stage is undefined at it.
+/// With a robust loss, boxes that are outliers at the state are left out.  Throws
+/// std::invalid_argument for a state that does not fit the graph, and std::runtime_error where a
+/// residual of the last stage is undefined at the state.
 Information ComputeInformation(const Graph& graph, const SolveOptions& options, const State& state);
 
-/// H with a trillionth of its diagonal added, which keeps a factorization alive on
-/// directions that nothing determines.
+/// H with 1e-12 of its diagonal added, so that it can be factorized even where a direction is
+/// undetermined.
 Eigen::SparseMatrix<double> Damped(const Eigen::SparseMatrix<double>& H);
 
 }  // namespace dqslam

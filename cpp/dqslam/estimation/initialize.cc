@@ -58,7 +58,8 @@ SvdFit FitSvd(const Camera& camera, const std::vector<View>& views) {
   const Vector3d origin = TriangulateMiddles(camera, views);
   double scale = 0;
   for (const View& view : views) scale += (view.camera.position - origin).norm() / views.size();
-  // Views from one place meet in the camera: no depth to scale by, and degenerate at any scale.
+  // If all views are from one place, the rays meet in the camera.  There is no distance to scale
+  // by, and the fit is degenerate at any scale.
   if (scale < 1e-9 * (1 + origin.norm())) scale = 1;
 
   Eigen::MatrixXd A = Eigen::MatrixXd::Zero(std::max<size_t>(4 * views.size(), 10), 10);
@@ -79,7 +80,7 @@ SvdFit FitSvd(const Camera& camera, const std::vector<View>& views) {
 
   SvdFit fit;
   fit.singular_values = svd.singularValues();
-  // One null vector means a clear gap between the last two singular values.
+  // The null space has one dimension if the gap between the last two singular values is clear.
   const auto& s = fit.singular_values;
   fit.degenerate = s[8] < 1e-8 * s[0] || s[8] < 3 * s[9] || std::abs(q[9]) < 1e-12;
   const Vector9d local = q.head<9>() / (fit.degenerate && q[9] == 0 ? 1e-12 : q[9]);
@@ -100,7 +101,8 @@ Vector9d BackProject(const Camera& camera, const std::vector<View>& views, const
   for (const View& view : views) {
     const double width = (view.box[2] - view.box[0]) / camera.fx;
     const double height = (view.box[3] - view.box[1]) / camera.fy;
-    // A side that the border cut is too short: trust the other one, or the longer of two.
+    // A side that the border cut is too short.  The other side is used, or the longer one if both
+    // are cut.
     const bool width_cut = view.truncated[0] || view.truncated[2];
     const bool height_cut = view.truncated[1] || view.truncated[3];
     const double side = width_cut && height_cut ? std::max(width, height)
@@ -108,7 +110,7 @@ Vector9d BackProject(const Camera& camera, const std::vector<View>& views, const
                         : height_cut            ? width
                                                 : std::sqrt(width * height);
     const double depth = 2 * radius / side;
-    // Never inside the sphere: a box as wide as the image would say so.
+    // The camera must be outside the sphere, even if the box is as wide as the image.
     const Vector3d in_world =
         view.camera.position + std::max(depth, 1.5 * radius) * RayInWorld(camera, view);
     center += in_world / views.size();

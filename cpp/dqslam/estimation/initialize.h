@@ -1,4 +1,4 @@
-// Where an object starts, from its boxes and the cameras that saw it.
+// The start of an object, from its boxes and the cameras that observed it.
 #pragma once
 
 #include <vector>
@@ -13,30 +13,43 @@ struct View {
   CameraInWorld<double> camera;
   Eigen::Vector4d box;               ///< pixels
   Eigen::Matrix4d sqrt_information;  ///< 1 / pixels
-  /// Edges that say nothing about where the object ends.
+  /// Edges that the image border cut, and that are therefore not edges of the object.
   EdgeFlags truncated = EdgeFlags::Constant(false);
 };
 
+<<<<<<< HEAD
+=======
+/// Prior on the logarithm of the object's semi-axes, in log meters.
+struct SizePrior {
+  double log_mean = 0;
+  double log_sigma = 1;
+};
+
+>>>>>>> prose
 /// The paper's linear fit.  [S&M17] eqs. (9), (10)
 struct SvdFit {
   Vector9d quadric;                              ///< of any signature
   Eigen::Matrix<double, 10, 1> singular_values;  ///< descending, of unit planes
-  bool degenerate = false;  ///< the null space is not one vector: planar motion does that
+  bool degenerate = false;  ///< the null space has several dimensions, as for planar motion
 };
 
-/// Smallest right singular vector of the planes' equations, normalized: planes of unit normal in a
-/// frame that is centered on the object and scaled by its distance.  Throws std::invalid_argument
-/// with fewer than 3 views.  Truncated edges take no part.
+/// The right singular vector with the smallest singular value, of the equations of all planes
+/// through edges.  For good conditioning, the planes have unit normals and are expressed in a frame
+/// that is centered on the object and scaled by its distance.  Truncated edges are left out. Throws
+/// std::invalid_argument for fewer than 3 views.
 SvdFit FitSvd(const Camera& camera, const std::vector<View>& views);
 
-/// [S&M17]: (1, 0, 0, 0, 1, 0, 0, 1, 0), that is Q* = I.  Its shape is -I: no ellipsoid.
+/// The start of [S&M17]: (1, 0, 0, 0, 1, 0, 0, 1, 0), that is, Q* = I.  Its shape matrix is -I, so
+/// it is not an ellipsoid.
 Vector9d IdentityQuadric();
 
-/// Sphere of the prior size at the depth where it fits the boxes; mean of the views.
+/// A sphere of the prior size.  Each view places it at the depth where it fits the box; the result
+/// is the mean of these places.
 Vector9d BackProject(const Camera& camera, const std::vector<View>& views, const SizePrior& prior);
 
-/// Sphere whose tangent residuals are smallest: linear in center and radius, with the size prior on
-/// the radius.  Falls back to BackProject where that sphere is not in front of all cameras.
+/// The sphere with the smallest tangent residuals, with the size prior on its radius.  The problem
+/// is linear in center and radius.  Falls back to BackProject where that sphere is not in front of
+/// all cameras.
 Vector9d FitSphere(const Camera& camera, const std::vector<View>& views, const SizePrior& prior);
 
 }  // namespace dqslam

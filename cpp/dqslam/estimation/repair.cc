@@ -10,7 +10,7 @@
 namespace dqslam {
 namespace {
 
-// Most boxes of an object beyond this, or all in the mean beyond twice as much: it is stuck.
+// An object is stuck if the median of its boxes is beyond this, or the mean beyond twice as much.
 constexpr double kImpossibleBox = 13.28;  // chi-square of 4 degrees of freedom, 99 %
 constexpr double kImpossibleMean = 2 * kImpossibleBox;
 constexpr double kImpossibleSize = 21.1;  // chi-square of 3 degrees of freedom, 99.99 %
@@ -18,7 +18,7 @@ constexpr double kTorn = 5;               // chi-square of odometry, per degree 
 constexpr int kMaxRestarts = 2;
 constexpr int kFewBoxes = 3;
 
-// Makes an attempt the state if it lowers the cost.
+// Replaces the state by an attempt if that has a lower cost.
 bool KeepIfBetter(const State& attempt, const Summary& total, State* state, Summary* summary) {
   const bool better = total.final_cost < summary->final_cost * (1 - 1e-9);
   if (!better) return false;
@@ -27,7 +27,8 @@ bool KeepIfBetter(const State& attempt, const Summary& total, State* state, Summ
   return true;
 }
 
-// Whether the prior excludes an object's size: boxes fit a sliver at another depth as well.
+// Whether the prior excludes an object's size.  Such an object may be at a wrong depth, where a
+// very thin ellipsoid fits the boxes.
 bool HasImpossibleSize(const PreparedGraph& prepared,
                        const SolveOptions& options,
                        const State& state,
@@ -39,7 +40,7 @@ bool HasImpossibleSize(const PreparedGraph& prepared,
   return error.square().sum() > kImpossibleSize * std::pow(prior.log_sigma[object], 2);
 }
 
-// An object by itself: its boxes from poses that stay where they are.
+// The stage of one object by itself: all its boxes, with constant poses.
 Stage StageOfObject(const PreparedGraph& prepared, const SolveOptions& options, int object) {
   Stage stage = BatchStage(prepared, options);
   stage.boxes = prepared.boxes_of_object[object];

@@ -1,34 +1,37 @@
-// Objects that are stuck in an impossible place, found by their boxes and started again.
+// Repair of a solution: objects that are stuck in a wrong minimum are found and started again.
 #pragma once
 
 #include "dqslam/solver/stage.h"
 
 namespace dqslam {
 
-/// The last stage: all poses and all boxes, with the last residual of the options.
+/// The last stage: it has all poses, all boxes and the last residual of the options.
 Stage BatchStage(const PreparedGraph& prepared, const SolveOptions& options);
 
-/// Objects whose boxes are impossible by the noise model, most of them or in the mean.
+/// Objects whose boxes are impossible under the noise model: the median of their chi-square exceeds
+/// 13.28, which is the 99 % quantile, or the mean exceeds twice that.
 std::vector<bool> StuckObjects(const PreparedGraph& prepared,
                                const SolveOptions& options,
                                const State& state);
 
-/// Whether odometry fits so badly that a part of the path must lie the wrong way round: boxes fit
-/// there as well, of a place that is turned by a whole turn more than odometry says.
+/// Whether odometry fits so badly, with a chi-square above 5 per degree of freedom, that a part of
+/// the path must have the wrong orientation.  Boxes can fit well there, because a heading that is
+/// wrong by a whole turn shows the same images.
 bool IsTorn(const PreparedGraph& prepared, const State& state);
 
-/// Objects of few boxes have several minima, in depth above all: starts each of them, and those
-/// whose size the prior excludes, at the depth of the prior size as well, by itself.  What lowers
-/// its own cost there is tried on the whole, and kept if it lowers that too.
+/// Objects with at most 3 boxes have several minima, mainly in depth.  Minimizes each of these, and
+/// each object whose size the prior excludes, by itself from the depth of the prior size.  Objects
+/// that reach a lower cost there are moved, all poses and objects are minimized, and the result is
+/// kept if the total cost is lower.
 void TryOtherDepths(const PreparedGraph& prepared,
                     const SolveOptions& options,
                     const Monitor& monitor,
                     State* state,
                     Summary* summary);
 
-/// Leaves out the objects whose typical box is impossible by the noise model, minimizes the rest,
-/// starts those objects again from all their views, and minimizes all; as long as that lowers the
-/// cost.  `summary` is that of the last stage so far and is updated.
+/// Leaves out the stuck objects, minimizes the rest, starts the stuck objects again from all their
+/// views, and minimizes everything.  Repeats this, at most twice, as long as it lowers the cost.
+/// `summary` is that of all stages so far and is updated.
 void RestartStuckObjects(const PreparedGraph& prepared,
                          const SolveOptions& options,
                          const Monitor& monitor,

@@ -47,7 +47,7 @@ class Solver {
   Solver(const PreparedGraph& prepared, const SolveOptions& options, const Monitor& monitor)
       : graph_(prepared.graph), options_(options), monitor_(monitor), prepared_(prepared) {}
 
-  /// Whether objects remain where their boxes say that they cannot be.
+  /// Whether objects remain that are impossible given their boxes.
   bool LeavesObjectsStuck(const State& state) const {
     const std::vector<bool> stuck = StuckObjects(prepared_, options_, state);
     return std::any_of(stuck.begin(), stuck.end(), [](bool is_stuck) { return is_stuck; });
@@ -55,7 +55,7 @@ class Solver {
 
   bool LeavesPathTorn(const State& state) const { return IsTorn(prepared_, state); }
 
-  /// Of every object's linear fit at the initial poses; NaN where it has fewer than 3 views.
+  /// Singular values of every object's SVD fit at the initial poses; NaN for fewer than 3 views.
   RowMatrix SvdSingularValues() const {
     State state{graph_.initial_poses, RowMatrix()};
     RowMatrix values = RowMatrix::Constant(graph_.num_objects(), 10, std::nan(""));
@@ -115,8 +115,8 @@ class Solver {
     return Refines() ? Batch(Residual::kTangent, loss, state) : Summary();
   }
 
-  // The minimum of s^2 chi^2 + phi (1 - s)^2: with all boxes switched on, the first steps would
-  // leave what the Cauchy loss has reached.
+  // Sets each switch to the minimum of s^2 chi^2 + phi (1 - s)^2.  If all switches were 1, the
+  // first steps would leave the solution that the Cauchy loss has reached.
   void SetSwitches(State* state) const {
     const double phi = options_.outlier_chi_square;
     state->switches = phi / (phi + 2 * BoxCosts(prepared_, options_, *state).array());
@@ -136,7 +136,7 @@ class Solver {
     const bool all_defined =
         residual != Residual::kBox || BoxCosts(prepared_, options_, *state).allFinite();
     Summary summary = Optimize(prepared_, options_, stage, monitor_, state);
-    // Boxes that were undefined at the start have used the tangent residual until here.
+    // Boxes that were undefined at the start of the stage have used the tangent residual so far.
     if (!all_defined) Append(Optimize(prepared_, options_, stage, monitor_, state), &summary);
     return summary;
   }
@@ -147,9 +147,9 @@ class Solver {
   const PreparedGraph& prepared_;
 };
 
-// Grows again in smaller steps, up to two times, where objects are stuck, the path is torn or the
-// last stage did not converge, and keeps the lowest cost.  With a robust loss an object may well
-// have outliers only: there it grows once, in smaller steps from the first.
+// Grows again in smaller steps, up to two times, if objects are stuck, the path is torn or the last
+// stage did not converge.  Keeps the result with the lowest cost.  With a robust loss, all boxes of
+// an object may be outliers, so these tests do not apply: it grows once, in smaller steps.
 Summary SolveInAttempts(const PreparedGraph& prepared,
                         const SolveOptions& options,
                         const std::optional<State>& start,

@@ -1,4 +1,4 @@
-// From a graph to an estimate: plain data in, plain data out.
+// The solver, from a graph to an estimate.  Its input and output are plain data.
 #pragma once
 
 #include <optional>
@@ -11,14 +11,15 @@ namespace dqslam {
 struct Solution {
   RowMatrix poses;                ///< (poses, d)
   RowMatrix landmarks;            ///< (objects, 9) parameters of the landmark model
-  RowMatrix dual_quadrics;        ///< (objects, 9) q1 .. q9, whichever the model
+  RowMatrix dual_quadrics;        ///< (objects, 9) q1 .. q9, for both landmark models
   RowMatrix svd_singular_values;  ///< (objects, 10) of the SVD starts; NaN where not used
-  Mask inliers;                   ///< (boxes) chi-square at most options.outlier_chi_square
+  Mask inliers;                   ///< (boxes) chi-square is at most options.outlier_chi_square
   Summary summary;
 };
 
-/// Solves from the odometry, or from `start` where it is given (parameters of the landmark model).
-/// Throws std::invalid_argument for bad input and Interrupted when the monitor asks to stop.
+/// Solves from the odometry, or from `start` if it is given.  The landmarks of `start` are
+/// parameters of the landmark model in the options. Throws std::invalid_argument for bad input and
+/// Interrupted when the monitor asks to stop.
 Solution Solve(const Graph& graph,
                const SolveOptions& options,
                const std::optional<State>& start = std::nullopt,

@@ -12,7 +12,7 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// A front without its update: L of its pivots and of the rows below them.
+// The columns of L of one front: at its pivots and at the rows below them.
 auto PivotsOf(const double* factor, const Front& front) {
   return Eigen::Map<const MatrixXd, 0, Eigen::OuterStride<>>(
       factor, front.pivots, front.pivots, Eigen::OuterStride<>(front.rows()));
@@ -55,7 +55,7 @@ bool BlockCholesky::Factorize(const BlockMatrix& A, const VectorXd& damping) {
   return true;
 }
 
-// Starts the columns of a front with those of A.
+// Copies the entries of A into the columns of a front.
 void BlockCholesky::PlaceBlocks(const BlockMatrix& A, int f) {
   const Front& front = elimination_.fronts[f];
   const std::ptrdiff_t stride = front.rows();
@@ -82,7 +82,8 @@ void BlockCholesky::PlaceBlocks(const BlockMatrix& A, int f) {
   }
 }
 
-// Starts the update of a front with zeros, and adds those of its children to it and the columns.
+// Sets the update of a front to zero, then adds the updates of its children to it and to the
+// columns.
 void BlockCholesky::AddUpdates(int f) {
   const Front& front = elimination_.fronts[f];
   for (int c = 0; c < front.below; ++c) {

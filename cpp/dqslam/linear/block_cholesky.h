@@ -9,19 +9,20 @@
 
 namespace dqslam {
 
-/// A + diag(damping) = L L^T, multifrontal, as often as the values of A change. One thread; the
-/// same bits each time.
+/// Multifrontal factorization A + diag(damping) = L L^T, which can be repeated whenever the values
+/// of A change. It runs in one thread and gives the same bits each time.
 class BlockCholesky {
  public:
-  /// Orders the blocks and lays out the factor, from the pattern of A alone.
+  /// Orders the blocks and lays out the factor. This needs only the pattern of A.
   explicit BlockCholesky(const BlockMatrix& A);
 
-  /// `A` has the pattern that the constructor saw; one damping per row.
-  /// False when A + diag(damping) is not positive definite or not finite: then there is no factor.
+  /// Factorizes A + diag(damping). `A` must have the pattern that the constructor was given, and
+  /// `damping` has one entry per row of A.
+  /// Returns false, and leaves no factor, when the sum is not positive definite or not finite.
   /// Throws std::invalid_argument when sizes differ from those of the constructor's matrix.
   bool Factorize(const BlockMatrix& A, const Eigen::VectorXd& damping);
 
-  /// (A + diag(damping))^-1 b of the last call of Factorize, which must have returned true.
+  /// (A + diag(damping))^-1 b. The last call of Factorize must have returned true.
   Eigen::VectorXd Solve(const Eigen::VectorXd& b) const;
 
  private:
@@ -35,8 +36,8 @@ class BlockCholesky {
   }
 
   Elimination elimination_;
-  std::vector<double> factor_;     // of each front rows() x pivots; garbage above the diagonal
-  std::vector<double> stacks_[2];  // updates
+  std::vector<double> factor_;     // each front's rows() x pivots, undefined above the diagonal
+  std::vector<double> stacks_[2];  // the updates that wait
 };
 
 }  // namespace dqslam

@@ -22,7 +22,7 @@ std::vector<int> Offsets(const std::vector<int>& sizes) {
   return offsets;
 }
 
-// (i, j) with i < j.
+// The pair in ascending order.
 std::pair<int, int> Ascending(const std::pair<int, int>& pair, size_t k, int blocks) {
   const auto [i, j] = pair;
   if (i == j || i < 0 || j < 0 || i >= blocks || j >= blocks) {
@@ -33,7 +33,8 @@ std::pair<int, int> Ascending(const std::pair<int, int>& pair, size_t k, int blo
   return {std::min(i, j), std::max(i, j)};
 }
 
-// Items by key(item), in [0, keys): counting, for pairs of a large graph come by the million.
+// Sorts items by key(item), which is in [0, keys).  It counts keys, because a large graph has
+// millions of pairs.
 template <typename Key>
 std::vector<int> StableSort(const std::vector<int>& items, int keys, const Key& key) {
   std::vector<int> next(keys + 1, 0), sorted(items.size());

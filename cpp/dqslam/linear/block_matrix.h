@@ -9,14 +9,16 @@
 
 namespace dqslam {
 
-/// A = A^T. All blocks on the diagonal are stored, off it those that were asked for, each once.
+/// A symmetric matrix. It stores all blocks on the diagonal and, once each, the requested blocks
+/// off the diagonal.
 ///
-/// Blocks are column-major and contiguous, so that callers who know the sizes accumulate through
-/// Eigen::Map<Eigen::Matrix<double, 3, 9>>. The pattern never changes; values start at zero.
+/// Blocks are column-major and contiguous, so that callers who know the sizes can accumulate
+/// through Eigen::Map<Eigen::Matrix<double, 3, 9>>. The pattern never changes; values start at
+/// zero.
 class BlockMatrix {
  public:
-  /// `sizes`: rows of each block on the diagonal, at least 1. `pairs`: blocks (i, j) that are
-  /// coupled, i != j, in either order, any number of times.
+  /// `sizes` are the rows of each block on the diagonal, at least 1. `pairs` are the blocks (i, j),
+  /// i != j, that are coupled; they may be in either order and may be repeated.
   /// Throws std::invalid_argument that names the block or the pair.
   BlockMatrix(std::vector<int> sizes, const std::vector<std::pair<int, int>>& pairs);
 
@@ -26,10 +28,10 @@ class BlockMatrix {
   int offset(int block) const { return offsets_[block]; }
   int rows() const { return offsets_.back(); }
 
-  /// Index of the block off the diagonal that the k-th of `pairs` was given.
+  /// Index of the block off the diagonal that belongs to the k-th entry of `pairs`.
   int index_of_pair(size_t k) const { return index_of_pair_[k]; }
   int num_off_diagonal() const { return static_cast<int>(coupled_.size()); }
-  /// (i, j) with i < j of a block off the diagonal, whichever order it was asked for in.
+  /// The blocks (i, j), i < j, that a block off the diagonal couples.
   std::pair<int, int> coupled(int index) const { return coupled_[index]; }
 
   /// A_ii, size(i) x size(i). Only the lower triangle, its diagonal included, is ever read.

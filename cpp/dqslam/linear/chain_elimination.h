@@ -1,9 +1,10 @@
-// Normal equations of a chain of poses and the objects they saw, eliminated as they come.
+// Normal equations of a chain of poses and the objects they observe, eliminated pose by pose.
 //
-//   minimize sum |r + J x|^2 / 2 over poses x_b .. x_e, each tied to the next by odometry only, and
-//   objects.  A pose is eliminated when the next one comes, an object when its last observation is
-//   in: what is kept is the front, the present pose and the objects that are still awaited.
-//   WindowResult is linear in the poses and square in the objects of the front.
+// The problem is to minimize sum |r + J x|^2 / 2 over objects and over poses x_b .. x_e, where
+// odometry ties each pose only to the next one.  A pose is eliminated when the next one is added,
+// an object after its last observation.  Only the front is kept: the present pose and the objects
+// that have observations to come.  The time is linear in the number of poses and quadratic in the
+// number of objects in the front.
 #pragma once
 
 #include <Eigen/Cholesky>
@@ -20,7 +21,7 @@ class Chain {
   using Square = Eigen::Matrix<double, k, k>;
   using Column = Eigen::Matrix<double, k, 1>;
 
-  /// Forgets everything.  `damping` lambda adds lambda diag(J^T J), Marquardt's.
+  /// Starts a new chain.  A damping lambda adds Marquardt's lambda diag(J^T J).
   void Reset(double damping) {
     grow_ = 1 + damping;
     used_ = 0;
@@ -32,7 +33,7 @@ class Chain {
     rhs_.template head<k>().setZero();
   }
 
-  /// A place in the front for a new object; `name` is what BackSubstitute() calls it.
+  /// Adds an object to the front and returns its slot.  BackSubstitute() passes on its `name`.
   int AddObject(int name) {
     if (!free_.empty()) {
       const int slot = free_.back();
@@ -53,7 +54,7 @@ class Chain {
     return slot;
   }
 
-  /// Information H and gradient g of the present pose, or of an object.
+  /// Adds information H and gradient g to the present pose, or to an object.
   void AddPose(const Square& H, const Column& g) {
     Grown(H, front_.template block<k, k>(0, 0));
     rhs_.template head<k>() -= g;
@@ -62,7 +63,7 @@ class Chain {
     Grown(H, front_.template block<9, 9>(At(slot), At(slot)));
     rhs_.template segment<9>(At(slot)) -= g;
   }
-  /// A residual of the present pose and an object.
+  /// Adds a residual between the present pose and an object.
   void AddObservation(int slot,
                       const Eigen::Vector4d& r,
                       const Eigen::Matrix<double, 4, k>& by_pose,
@@ -72,7 +73,8 @@ class Chain {
     front_.template block<9, k>(At(slot), 0).noalias() += by_object.transpose() * by_pose;
   }
 
-  /// Goes on to the next pose; false where the equations are not positive definite.
+  /// Adds odometry to the next pose, which becomes the present one, and eliminates the pose before.
+  /// Returns false where the equations are not positive definite.
   bool NextPose(const Column& r, const Square& by_from, const Square& by_to) {
     AddPose(by_from.transpose() * by_from, by_from.transpose() * r);
     const Square to_next = by_from.transpose() * by_to;
@@ -99,7 +101,7 @@ class Chain {
     return true;
   }
 
-  /// Eliminates what is left.
+  /// Eliminates the present pose and the remaining objects.
   bool Finish() {
     if (!EliminatePose(nullptr)) return false;
     std::vector<bool> is_free(used_, false);
@@ -110,18 +112,18 @@ class Chain {
     return true;
   }
 
-  /// The most objects that the front had at a time.
+  /// The largest number of objects that the front had at a time.
   int most_objects() const { return used_; }
 
-  /// Steps in the reverse order of elimination: visit_pose(step) from the last to the first, and
-  /// visit_object(name, step).
+  /// Computes the steps in the reverse order of elimination.  Calls visit_pose(step) for each pose,
+  /// from the last to the first, and visit_object(name, step) for each object.
   template <typename VisitPose, typename VisitObject>
   void BackSubstitute(VisitPose&& visit_pose, VisitObject&& visit_object) {
     solution_ = Eigen::VectorXd::Zero(k + 9 * used_);
     for (auto record = records_.rbegin(); record != records_.rend(); ++record) {
       const double* data = arena_.data() + record->offset;
       if (record->slot < 0) {
-        // The front's first entries are the pose behind this one.
+        // The first entries of the front belong to the pose after this one.
         const Column step = Substitute<k>(data, record->size);
         solution_.template head<k>() = step;
         visit_pose(step);
@@ -135,10 +137,10 @@ class Chain {
 
  private:
   struct Entry {
-    int slot;  ///< -1 for a pose
-    int name;  ///< of an object
-    int size;  ///< of the front
-    size_t offset;
+    int slot;       ///< of an object; -1 for a pose
+    int name;       ///< of an object
+    int size;       ///< of the front
+    size_t offset;  ///< in arena_
   };
 
   int At(int slot) const { return k + 9 * slot; }
@@ -149,7 +151,7 @@ class Chain {
     block.diagonal() += (grow_ - 1) * information.diagonal();
   }
 
-  // Pose out; `to_next` couples it to the pose that takes its place, if any.
+  // Eliminates the present pose; `to_next` couples it to the next pose and is null for the last.
   bool EliminatePose(const Square* to_next) {
     const int m = 9 * used_;
     const Eigen::LLT<Square> cholesky(Square(front_.template topLeftCorner<k, k>()));
@@ -165,7 +167,8 @@ class Chain {
     return true;
   }
 
-  // The Schur complement of what is eliminated; `panel` couples the front to it.
+  // Subtracts the Schur complement of the eliminated variable from the front; `panel` couples the
+  // two.
   template <int n>
   void Downdate(int slot,
                 const Eigen::LLT<Eigen::Matrix<double, n, n>>& cholesky,

@@ -8,15 +8,16 @@
 namespace dqslam {
 namespace {
 
-// Fronts have a few dozen rows and a few pivots: too small for Eigen's products, which first copy
-// their operands. A tile stays in the registers that every x86-64 has, and so does its sum.
+// Fronts have a few dozen rows and a few pivots. That is too small for Eigen's products, which
+// first copy their operands. A tile and its sum fit into the registers that every x86-64 has.
 constexpr int kTile = 4;
 using Tile = Eigen::Matrix<double, kTile, kTile>;
 using TileColumn = Eigen::Map<const Eigen::Matrix<double, kTile, 1>>;
 static_assert(kFrontPadding == kTile - 1);
 
-// target(i, j) -= sum_k L(i, k) L(j, k) for j <= i < rows, j < columns, k < depth. What tiles on
-// the border or the diagonal compute besides is dropped, or lands above the diagonal.
+// target(i, j) -= sum_k L(i, k) L(j, k) for j <= i < rows, j < columns, k < depth. Tiles on the
+// border or on the diagonal compute more than that; the rest is dropped or lands above the
+// diagonal.
 void SubtractProduct(const double* L,
                      int depth,
                      int rows,

@@ -3,16 +3,18 @@
 
 namespace dqslam {
 
-/// How far past the end of `factor` EliminatePivots reads, whatever is there.
+/// EliminatePivots reads this many values past the end of `factor`, but does not use them.
 inline constexpr int kFrontPadding = 3;
 
-/// Eliminates the `columns` pivots, the first of `rows` rows, in place. All matrices are
-/// column-major, of symmetric ones only the lower triangle is read and meant.
+/// Eliminates the pivots, which are the first `columns` of `rows` rows, in place. All matrices are
+/// column-major; only the lower triangle of a symmetric matrix is read and written.
 ///
-///   factor  rows x columns: of the matrix in, of its Cholesky factor L out
-///   update  (rows - columns) squared: has L21 L21^T subtracted, L21 being L below the pivots
+///   factor  rows x columns. It holds columns of the matrix on entry and of its Cholesky factor L
+///           on return.
+///   update  square, with rows - columns rows. L21 L21^T is subtracted from it, where L21 is the
+///           part of L below the pivots.
 ///
-/// False when a pivot is not a positive finite number.
+/// Returns false when a pivot is not a positive finite number.
 bool EliminatePivots(int columns, int rows, double* factor, double* update);
 
 }  // namespace dqslam

@@ -121,8 +121,8 @@ class Layout {
     }
   }
 
-  // The updates of a front's children are the last ones on their stack: of all fronts that still
-  // wait, they were eliminated last. By turns on two stacks, an update can be formed in its place.
+  // The updates of a front's children are on top of their stack, because of all updates that wait
+  // they were formed last. The front's own update goes to the other stack, so it needs no copy.
   void PlaceUpdate(int f, Front& front) {
     front.stack = stack_[f];
     if (!children_[f].empty()) {

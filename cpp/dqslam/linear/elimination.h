@@ -1,4 +1,4 @@
-// Where everything goes when a block matrix is factorized front by front.
+// The layout of a block matrix that is factorized front by front.
 #pragma once
 
 #include <cstddef>
@@ -8,14 +8,17 @@
 
 namespace dqslam {
 
-/// Columns of the factor that share their rows and are eliminated together. What they subtract
-/// from the rows below their pivots, the front's update, waits on a stack for the parent.
+/// Columns of the factor that have the same rows and are eliminated together. The columns subtract
+/// a matrix from the rows below their pivots: the front's update, which waits on a stack until the
+/// parent adds it.
 struct Front {
-  int pivot;          ///< the first one, in the order of elimination
-  int pivots, below;  ///< numbers of pivots and of rows below them
-  int row, block,
-      child;  ///< where its own begin in Elimination; where the next front's do they end
-  int stack;  ///< 0 or 1: of its update; those of its children are on the other one
+  int pivot;   ///< the first pivot, as a row in the order of elimination
+  int pivots;  ///< the number of pivots
+  int below;   ///< the number of rows below the pivots
+  /// The first of its rows, blocks and children in the lists of Elimination. They end where those
+  /// of the next front begin.
+  int row, block, child;
+  int stack;  ///< 0 or 1, the stack of its update; the updates of its children are on the other
   std::ptrdiff_t update;  ///< start on that stack: below x below, column-major, lower triangle
   std::ptrdiff_t factor;  ///< start in the factor: rows() x pivots, column-major
 
@@ -24,32 +27,34 @@ struct Front {
 
 /// Where a block of A goes among the columns of a front.
 struct PlacedBlock {
-  int index;  ///< as in BlockMatrix::OffDiagonal; of block b on the diagonal: -1 - b
+  int index;  ///< as in BlockMatrix::OffDiagonal, or -1 - b for block b on the diagonal
   int row, column;
   bool transposed;
 };
 
-/// Rows from `from` on of a child's update are rows from `to` on of its parent's front.
+/// `length` rows of a child's update, starting at `from`, are the rows of its parent's front that
+/// start at `to`.
 struct RowRun {
   int from, to, length;
 };
 
 struct Child {
   int front;
-  int run;  ///< where its runs begin in Elimination; where the next child's do they end
+  int run;  ///< the first of its runs in Elimination; they end where those of the next child begin
 };
 
-/// The symbolic half of a multifrontal factorization (Duff & Reid 1983), from the pattern alone.
+/// The symbolic half of a multifrontal factorization (Duff & Reid 1983). It depends only on the
+/// pattern.
 struct Elimination {
   explicit Elimination(const BlockMatrix& A);
 
   int num_fronts() const { return static_cast<int>(fronts.size()) - 1; }
 
-  std::vector<int> place;     ///< of each row of A in the order of elimination
-  std::vector<Front> fronts;  ///< children before parents; the last one only ends the one before
-  std::vector<int> rows;      ///< below the pivots, in the order of elimination, ascending
+  std::vector<int> place;     ///< the place of each row of A in the order of elimination
+  std::vector<Front> fronts;  ///< children before parents; the last entry only marks the end
+  std::vector<int> rows;      ///< rows below the pivots, in the order of elimination, ascending
   std::vector<PlacedBlock> blocks;
-  std::vector<Child> children;  ///< ascending; the last one only ends the one before
+  std::vector<Child> children;  ///< ascending; the last entry only marks the end
   std::vector<RowRun> runs;
   std::ptrdiff_t stack_size[2] = {0, 0};
 };

@@ -10,10 +10,10 @@ namespace {
 using Lists = std::vector<std::vector<int>>;
 
 // Blocks in the order of elimination: approximate minimum degree (Amestoy, Davis & Duff 1996).
-// For graphs of boxes that takes less arithmetic than cutting the drive into halves.
+// For graphs of boxes this needs less arithmetic than nested dissection of the path.
 std::vector<int> MinimumDegree(const BlockMatrix& A) {
   const int blocks = A.num_blocks();
-  if (blocks == 0) return {};  // Eigen's sparse matrices read out of bounds
+  if (blocks == 0) return {};  // Eigen would read an empty sparse matrix out of bounds.
   Eigen::VectorXi entries = Eigen::VectorXi::Ones(blocks);
   for (int index = 0; index < A.num_off_diagonal(); ++index) ++entries[A.coupled(index).first];
   Eigen::SparseMatrix<char> lower(blocks, blocks);
@@ -56,17 +56,17 @@ Lists FactorPattern(const BlockMatrix& A, const std::vector<int>& order) {
   return below;
 }
 
-// Time of a front, in multiplications with addition: its arithmetic, the way of its update through
-// memory, and the start. With half or four times these constants, times of large graphs differ by
-// 10 %.
+// Time of a front, in multiplications with addition: its arithmetic, moving its update through
+// memory, and a constant overhead. Half or four times these constants change the time of large
+// graphs by 10 %.
 double Cost(double pivots, double below) {
   constexpr double kPerEntry = 2, kPerFront = 1000;
   const double arithmetic = pivots * pivots * pivots / 6 + pivots * below * (pivots + below) / 2;
   return arithmetic + kPerEntry * below * below / 2 + kPerFront;
 }
 
-// The columns of each front, ascending, in the list of the last of them; other lists are empty.
-// A child joins its parent where that is cheaper, though the factor may then store zeros.
+// The columns of each front, ascending, in the list of its last column; the other lists are empty.
+// A child is merged into its parent where that is cheaper, even if the factor then stores zeros.
 Lists MergeColumns(const BlockMatrix& A, const std::vector<int>& order, const Lists& below) {
   const int blocks = A.num_blocks();
   Lists merged(blocks), children(blocks);
@@ -91,8 +91,8 @@ Lists MergeColumns(const BlockMatrix& A, const std::vector<int>& order, const Li
   return merged;
 }
 
-// Orders the children of each front so that few updates wait at a time (Liu 1986): first the one
-// whose subtree needs the most memory besides the update that stays.
+// Orders the children of each front so that few updates wait at a time (Liu 1986). The first child
+// is the one whose subtree needs the most memory in addition to its own update.
 void SortChildren(const BlockMatrix& A,
                   const std::vector<int>& order,
                   const Lists& below,
@@ -113,7 +113,7 @@ void SortChildren(const BlockMatrix& A,
   }
 }
 
-// All that hangs from `roots`, each right after what hangs from itself.
+// The nodes of the trees below `roots` in postorder: each node comes right after its descendants.
 std::vector<int> Postorder(const Lists& children, const std::vector<int>& roots) {
   std::vector<int> pending = roots, reversed;
   while (!pending.empty()) {
@@ -132,7 +132,7 @@ FrontTree::FrontTree(const BlockMatrix& A) {
   Lists pattern = FactorPattern(A, minimum_degree);
   const Lists merged = MergeColumns(A, minimum_degree, pattern);
 
-  // So far a front is known by its last column, a position in `minimum_degree`.
+  // Up to here, a front is identified by its last column, which is a position in `minimum_degree`.
   std::vector<int> last_of(A.num_blocks()), roots;
   for (int last = 0; last < A.num_blocks(); ++last) {
     for (const int column : merged[last]) last_of[column] = last;

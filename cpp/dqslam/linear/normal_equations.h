@@ -1,4 +1,4 @@
-// Normal equations of a least-squares problem, and what residuals add to them.
+// Normal equations of a least-squares problem, and how residuals are added to them.
 #pragma once
 
 #include <Eigen/Core>
@@ -7,20 +7,21 @@
 
 namespace dqslam {
 
-/// H step = -gradient is the Gauss-Newton step.
+/// The Gauss-Newton step solves H step = -gradient.
 struct NormalEquations {
   double cost = 0;           ///< half the sum of the squared residuals, after the loss
   Eigen::VectorXd gradient;  ///< J^T r
   BlockMatrix H;             ///< J^T J
 };
 
-/// Adds residuals with their derivatives, block by block; a block below zero is constant.
+/// Adds residuals with their derivatives, block by block.  A block below zero is constant and is
+/// skipped.
 class Accumulator {
  public:
   explicit Accumulator(NormalEquations* equations) : equations_(*equations), H_(equations_.H) {}
 
-  /// What a residual says of one block. (Eigen's other product first copies 4 x 9 to be
-  /// multiplied.)
+  /// Adds J^T J and J^T r of one block. lazyProduct avoids the copy of a 4 x 9 operand that
+  /// Eigen's usual product makes.
   template <int kRows, int kColumns>
   void AddDiagonal(int block,
                    const Eigen::Matrix<double, kRows, kColumns>& J,
@@ -31,7 +32,7 @@ class Accumulator {
         J.transpose().lazyProduct(J);
   }
 
-  /// How it couples two blocks: J_a and J_b in the order of their numbers.
+  /// Adds J_a^T J_b of two blocks; J_a belongs to the block with the smaller number.
   template <int kRows, int kA, int kB>
   void AddOffDiagonal(int shared,
                       const Eigen::Matrix<double, kRows, kA>& J_a,

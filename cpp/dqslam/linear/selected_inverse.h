@@ -5,17 +5,17 @@
 
 namespace dqslam {
 
-/// H^-1 on the pattern of its Cholesky factor (Takahashi, Fagan & Chin 1973), which holds that of
-/// H.
+/// H^-1 on the pattern of the Cholesky factor of H (Takahashi, Fagan & Chin 1973). That pattern
+/// contains the pattern of H.
 class SelectedInverse {
  public:
   /// Throws std::runtime_error when H is not positive definite.
   explicit SelectedInverse(const Eigen::SparseMatrix<double>& H);
 
-  /// An entry that H stores; others may be 0 instead of what they are.
+  /// An entry of H^-1 that H stores. For any other entry the result may be 0 instead of its value.
   double operator()(int row, int column) const;
 
-  /// Square block on the diagonal, all of whose entries H stores, zeros included.
+  /// A square block on the diagonal of H^-1. H must store all entries of that block, also zeros.
   Eigen::MatrixXd Block(int start, int size) const;
 
  private:

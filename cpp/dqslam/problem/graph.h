@@ -1,4 +1,4 @@
-// The problem as plain tables, and the answer.  Ids are row numbers.  No Ceres here.
+// The problem as plain tables, and the state and summary of its solution.  Ids are row numbers.
 #pragma once
 
 #include <string>
@@ -10,28 +10,28 @@
 
 namespace dqslam {
 
-/// Relative poses between two rows of `initial_poses`.  d pose size, k tangent size.
+/// Relative poses between two rows of `initial_poses`.  d is the size of a pose, k of its tangent.
 struct OdometryTable {
   IndexVector from, to;
   RowMatrix relative;    ///< (n, d): from_pose^-1 o to_pose
-  RowMatrix covariance;  ///< (n, k * k), of (from o relative) (-) to
+  RowMatrix covariance;  ///< (n, k * k) of the error (from o relative) (-) to
   int size() const { return static_cast<int>(from.size()); }
 };
 
-/// Detections whose object is known.
+/// Detected boxes with their known objects.
 struct BoxTable {
   IndexVector pose, object;
   RowMatrix box;         ///< (n, 4) undistorted pixels
   RowMatrix covariance;  ///< (n, 16) pixels^2
-  BoolTable truncated;   ///< (n, 4) edges that the image border cut: the object goes on beyond
+  BoolTable truncated;   ///< (n, 4) edges where the image border cut the object
   int size() const { return static_cast<int>(pose.size()); }
 };
 
-/// Measurements of one kind between poses and objects, beside boxes: m numbers each.
+/// Measurements of one kind between poses and objects, other than boxes.  Each has m values.
 struct MeasurementTable {
   std::string kind;  ///< "position" or "range": the costs of costs/measurements.h
   IndexVector pose, object;
-  RowMatrix value;       ///< (n, m); of positions object_in_robot, meters, [S&M17] eq. (8)
+  RowMatrix value;       ///< (n, m) meters; a position is object_in_robot, [S&M17] eq. (8)
   RowMatrix covariance;  ///< (n, m * m)
   int size() const { return static_cast<int>(pose.size()); }
 };
@@ -44,10 +44,10 @@ struct SizePrior {
 
 /// The same for every object of a graph.
 struct SizePriorTable {
-  Eigen::VectorXd log_mean, log_sigma;  ///< one row an object
+  Eigen::VectorXd log_mean, log_sigma;  ///< one row for each object
 };
 
-/// What is known of the scene; each part is off while its sigma is 0.
+/// Prior knowledge of the scene.  Each part is off while its sigma is 0.
 struct ScenePriors {
   Eigen::Vector3d up = Eigen::Vector3d::UnitZ();  ///< unit normal n of the ground, in the world
   double plane_offset = 0;                        ///< d of the ground n.x + d = 0, meters
@@ -75,38 +75,42 @@ struct Graph {
   }
 };
 
-/// Throws std::invalid_argument naming the table and the row for NaN or infinite numbers, wrong
+/// Throws std::invalid_argument, naming the table and the row, for NaN or infinite numbers, wrong
 /// shapes, ids out of range, inverted boxes, covariances that are not positive definite,
-/// quaternions that are not unit, non-positive sigmas, poses without odometry from an earlier pose
-/// (unless `poses_known`) and objects that no box shows.
+/// quaternions that are not unit, non-positive sigmas, objects without a box, and poses without
+/// odometry from an earlier pose (unless `poses_known`).
 void Validate(const Graph& graph, bool poses_known);
 
-/// Poses and landmarks: where a solve starts, stands and ends.
+/// Poses and landmarks at the start, during or at the end of a solve.
 struct State {
   RowMatrix poses;                ///< (poses, d)
   RowMatrix landmarks;            ///< (objects, 9) in the landmark model of the solve
-  Eigen::VectorXd switches = {};  ///< (boxes) of switchable constraints: 1 believed, 0 not
+  Eigen::VectorXd switches = {};  ///< (boxes) of switchable constraints: 1 is on, 0 is off
 };
 
 struct Summary {
-  double initial_cost = 0;         ///< half the sum of squared residuals, in sigmas, after the loss
-  double final_cost = 0;           ///< likewise
-  int iterations = 0;              ///< of all stages
-  int rejected_steps = 0;          ///< of all stages
-  double gradient_norm_start = 0;  ///< infinity norm, at the start of the last stage
-  double gradient_norm_end = 0;    ///< likewise, at its end
-  double seconds = 0;              ///< wall clock, all stages
-  double start_seconds = 0;        ///< of these, until all objects had a start
-  double evaluation_seconds = 0;   ///< of all stages: residuals and their derivatives
-  double linear_solver_seconds = 0;  ///< of all stages: orderings, factorizations, solutions
+  /// Half the sum of squared residuals, in sigmas and after the loss, at the start of the first
+  /// stage.
+  double initial_cost = 0;
+  /// Half the sum of squared residuals, in sigmas and after the loss, at the end of the last stage.
+  double final_cost = 0;
+  int iterations = 0;                ///< iterations of all stages
+  int rejected_steps = 0;            ///< rejected steps of all stages
+  double gradient_norm_start = 0;    ///< infinity norm at the start of the last stage
+  double gradient_norm_end = 0;      ///< infinity norm at the end of the last stage
+  double seconds = 0;                ///< wall-clock time of all stages
+  double start_seconds = 0;          ///< the part of `seconds` until all objects had a start
+  double evaluation_seconds = 0;     ///< time for residuals and their derivatives, all stages
+  double linear_solver_seconds = 0;  ///< time to order, factorize and solve, all stages
   bool converged = false;            ///< the last stage met a stopping test and accepted a step
-  std::string message;               ///< how it ended, in words
+  std::string message;               ///< the reason why the last stage ended
 };
 
-/// Makes `total` the summary of all stages so far: counts add up, the rest is the last stage's.
+/// Adds a stage to the summary of all stages so far.  Counts and times add up, initial_cost remains
+/// that of the first stage, and the other fields become those of the new one.
 void Append(const Summary& stage, Summary* total);
 
-/// One line for people.
+/// The summary in one readable line.
 std::string ToString(const Summary& summary);
 
 }  // namespace dqslam

@@ -1,4 +1,4 @@
-// What a caller may choose.  Every default lives here and nowhere else.
+// The options of a solve.  Their defaults are defined here and nowhere else.
 #pragma once
 
 #include <functional>
@@ -15,17 +15,17 @@ enum class Mode {
 
 enum class Residual {
   kAlgebraic,            ///< l^T P Q* P^T l, as published
-  kAlgebraicNormalized,  ///< the same, divided by (P Q* P^T)_33
-  kTangent,              ///< distance to the planes behind the edges
+  kAlgebraicNormalized,  ///< the algebraic residual, divided by (P Q* P^T)_33
+  kTangent,              ///< distance of the ellipsoid to the planes through the edges
   kBox,                  ///< edges of the exact bounding box, in pixels
-  kTangentThenBox,       ///< tangent to get there, box to finish
+  kTangentThenBox,       ///< tangent residuals in the first stages, box residuals in the last one
 };
 
 enum class Start {
-  kIdentity,   ///< [S&M17]: Q* = I; for the ellipsoid model the unit sphere at the origin
-  kSvd,        ///< [S&M17] eqs. (9), (10); where it is no ellipsoid, the sphere
-  kSizePrior,  ///< back-projected to the depth at which the prior size fits the box
-  kSphere,     ///< linear in center and radius, from the tangent residual
+  kIdentity,   ///< Q* = I as in [S&M17]; for the ellipsoid model, the unit sphere at the origin
+  kSvd,        ///< [S&M17] eqs. (9), (10); kSphere where the result is not an ellipsoid
+  kSizePrior,  ///< a sphere of the prior size, at the depth where it fits the box
+  kSphere,     ///< the sphere with the smallest tangent residuals, from a linear problem
 };
 
 enum class Schedule {
@@ -33,7 +33,7 @@ enum class Schedule {
   kGrow,   ///< a few poses at a time along the trajectory
 };
 
-/// Robust back ends, on whole boxes; odometry is always quadratic.
+/// Robust losses.  They apply to whole boxes; odometry is always quadratic.
 enum class Loss {
   kNone,
   kHuber,
@@ -46,12 +46,13 @@ enum class Loss {
 
 enum class Minimizer { kLevenbergMarquardt, kDogleg };
 
-/// Who carries out the steps; the costs and the methods are the same.
+/// The solver that minimizes a stage.  Costs and methods are the same in both.
 enum class Backend {
-  /// Normal equations in blocks, boxes differentiated by hand.  Stages with an algebraic residual,
-  /// with dual quadrics or with switchable constraints go through Ceres all the same.
+  /// This library's solver, with block-sparse normal equations and derivatives of boxes by hand.
+  /// Ceres still minimizes stages with an algebraic residual, dual quadrics or switchable
+  /// constraints.
   kNative,
-  kCeres,  ///< ceres::Solve on AutoDiff cost functions: slower, a second opinion
+  kCeres,  ///< ceres::Solve on AutoDiff cost functions for every stage: slower, for comparison
 };
 
 struct SolveOptions {
@@ -61,18 +62,28 @@ struct SolveOptions {
   Start start = Start::kSphere;
   Schedule schedule = Schedule::kGrow;
   Loss loss = Loss::kNone;
-  double loss_scale = 2.0;            ///< of Huber and Cauchy: sigmas of a whole box
-  double outlier_chi_square = 13.28;  ///< of the others: 99 % of chi-square with 4 dof
-  double algebraic_sigma = 1.0;       ///< of both algebraic residuals, their own unit
+  /// Scale of the Huber and Cauchy losses, in sigmas of a whole box.
+  double loss_scale = 2.0;
+  /// A box whose chi-square exceeds this is an outlier.  It is the threshold of all robust losses
+  /// but Huber and Cauchy.  The default is the 99 % quantile with 4 degrees of freedom.
+  double outlier_chi_square = 13.28;
+  /// Sigma of both algebraic residuals, in the unit of the residual.
+  double algebraic_sigma = 1.0;
   Backend backend = Backend::kNative;
-  Minimizer minimizer = Minimizer::kDogleg;  ///< of the last stage
-  int max_iterations = 300;                  ///< of each batch stage
-  double function_tolerance = 1e-7;          ///< stop when |change of cost| / cost falls below
-  int grow_poses = 64;                       ///< poses added at a time, or more:
-  double grow_rotation = 0.25;               ///< while odometry's own sigma is below, radians
-  int grow_iterations = 10;                  ///< Levenberg-Marquardt steps after each addition
-  double grow_tolerance = 1e-2;              ///< function tolerance of these steps
-  int grow_min_views = 8;                    ///< boxes an object needs before it is started
+  Minimizer minimizer = Minimizer::kDogleg;  ///< the minimizer of the last stage
+  int max_iterations = 300;                  ///< the most iterations of each batch stage
+  /// A batch stage stops when |change of cost| / cost is at most this.
+  double function_tolerance = 1e-7;
+  /// Growing adds at least this number of poses at a time.
+  int grow_poses = 64;
+  /// Growing adds more than grow_poses poses as long as the sigma of odometry's rotation over the
+  /// added poses is at most this, in radians.
+  double grow_rotation = 0.25;
+  int grow_iterations = 10;  ///< the most Levenberg-Marquardt iterations after each addition
+  /// The minimization after an addition stops when |change of cost| / cost is at most this.
+  double grow_tolerance = 1e-2;
+  /// Growing starts an object when it has this number of boxes.  The last addition starts all.
+  int grow_min_views = 8;
 };
 
 /// Called once an iteration; false asks to stop.

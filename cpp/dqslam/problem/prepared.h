@@ -1,4 +1,4 @@
-// A validated graph with what is derived from it once per solve: whitening and adjacency.
+// A validated graph with data that is derived from it once per solve: whitening and adjacency.
 #pragma once
 
 #include <vector>
@@ -9,27 +9,27 @@
 namespace dqslam {
 
 struct PreparedGraph {
-  /// Validates; throws std::invalid_argument.  The graph must outlive the result.
+  /// Validates the graph, which throws std::invalid_argument.  The graph must outlive the result.
   PreparedGraph(const Graph& graph, bool poses_known);
 
   const Graph& graph;
   Mount mount;
-  std::vector<Eigen::MatrixXd> odometry_sqrt_information;  ///< k x k, one an odometry row
-  std::vector<Eigen::Matrix4d> box_sqrt_information;
-  std::vector<int> measurement_kinds;                   ///< one a table, see costs/measurements.h
-  std::vector<RowMatrix> measurement_sqrt_information;  ///< one a table, m * m a row
+  std::vector<Eigen::MatrixXd> odometry_sqrt_information;  ///< k x k for each odometry row
+  std::vector<Eigen::Matrix4d> box_sqrt_information;       ///< one for each box row
+  std::vector<int> measurement_kinds;  ///< the kind of each table, see costs/measurements.h
+  std::vector<RowMatrix> measurement_sqrt_information;  ///< (n, m * m) for each table
   std::vector<std::vector<int>> boxes_of_object;        ///< box rows in the order of their poses
-  std::vector<int> odometry_into;                       ///< row that leads to each pose; -1: none
+  std::vector<int> odometry_into;  ///< the odometry row that leads to each pose, or -1
 };
 
-/// Those of a box of the graph, see ellipsoid.h; where its object is not strictly in front, the
-/// edges that the image border cut.
+/// The one-sided edges of a box of the graph, see geometry/ellipsoid.h.  Where the object is not
+/// strictly in front of the camera, these are the edges that the image border cut.
 EdgeFlags OneSidedEdges(const PreparedGraph& prepared, int box, const Surface<double>& in_camera);
 
-/// Where the camera stands at a pose of the state.
+/// The camera at a pose of the state.
 CameraInWorld<double> LocateCamera(const PreparedGraph& prepared, const State& state, int pose);
 
-/// Poses from `begin` on become the chain of odometry behind the poses before them.
+/// Replaces the poses from `begin` to `end` by odometry that continues from the poses before them.
 void DeadReckon(const PreparedGraph& prepared, int begin, int end, State* state);
 
 }  // namespace dqslam

@@ -12,8 +12,9 @@
 namespace dqslam {
 namespace {
 
-// Debian's CHOLMOD opens OpenMP threads of its own, which cost more than they give at this size.  A
-// Ceres without SuiteSparse factorizes with Eigen, in one thread: the core is built without OpenMP.
+// Debian's CHOLMOD starts OpenMP threads of its own, which make problems of this size slower.  A
+// Ceres without SuiteSparse factorizes with Eigen in one thread, as this core is built without
+// OpenMP.
 class SingleOpenMpThread {
 #ifdef _OPENMP
  public:
@@ -81,7 +82,7 @@ Summary MinimizeByCeres(const TrustRegionOptions& options,
   ceres_options.function_tolerance = options.function_tolerance;
   ceres_options.gradient_tolerance = 1e-12;
   ceres_options.parameter_tolerance = 1e-12;
-  // An invalid step is a step into impossible geometry: shrink and go on.
+  // An invalid step leads into impossible geometry.  The solver shrinks the step and continues.
   ceres_options.max_num_consecutive_invalid_steps = 50;
   ceres_options.num_threads = 1;
   ceres_options.logging_type = ceres::SILENT;

@@ -1,4 +1,4 @@
-// The same stage by ceres::Solve.
+// Minimization of a stage by ceres::Solve.
 #pragma once
 
 #include "dqslam/solver/trust_region.h"
@@ -9,7 +9,7 @@ class Problem;
 
 namespace dqslam {
 
-/// Minimizes from where the parameters of the problem stand.  Throws Interrupted.
+/// Minimizes from the present parameters of the problem.  Throws Interrupted.
 Summary MinimizeByCeres(const TrustRegionOptions& options,
                         const Monitor& monitor,
                         ceres::Problem* problem);

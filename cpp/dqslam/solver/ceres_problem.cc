@@ -14,7 +14,7 @@
 namespace dqslam {
 namespace {
 
-// A visitor of terms that makes each a residual block.
+// A visitor that adds each term as a residual block.
 template <typename Pose, typename Landmark>
 class ResidualBlocks {
  public:
@@ -26,7 +26,7 @@ class ResidualBlocks {
       : prepared_(prepared), options_(options), loss_(loss), state_(*state), problem_(*problem) {}
 
   void AddVariables(const VariableIndex& variables) {
-    auto* manifold = new PoseManifold<Pose>;  // the problem owns it, once for all poses
+    auto* manifold = new PoseManifold<Pose>;  // owned by the problem, shared by all poses
     for (int pose = 0; pose < variables.end_pose; ++pose) {
       double* parameters = ParametersOf(PoseRow{pose});
       problem_.AddParameterBlock(parameters, Pose::kSize, manifold);

@@ -9,7 +9,7 @@ class Problem;
 
 namespace dqslam {
 
-/// Adds all terms of the stage, and the poses and objects that they are about.  The problem points
+/// Adds all terms of the stage, with their poses and objects, to the problem.  The problem points
 /// into `state`, which must outlive it.
 void MakeCeresProblem(const PreparedGraph& prepared,
                       const SolveOptions& options,

@@ -14,7 +14,7 @@ namespace {
 
 using Eigen::VectorXd;
 
-// A visitor of terms that lists the pairs of blocks that terms of two blocks couple.
+// A visitor that lists the pairs of blocks which the terms couple.
 class PairCollector {
  public:
   PairCollector(const Graph& graph, const VariableIndex& variables)
@@ -31,7 +31,7 @@ class PairCollector {
     return true;
   }
 
-  // One a term of two blocks; below zero: one of them is constant.
+  // One entry for each term of two blocks, below zero if one of the two is constant.
   const std::vector<std::pair<int, int>>& all() const { return pairs_; }
 
  private:
@@ -42,7 +42,7 @@ class PairCollector {
   std::vector<std::pair<int, int>> pairs_;
 };
 
-// The pattern of H, and which of its blocks off the diagonal each term of two blocks fills.
+// The pattern of H, and the block off its diagonal to which each term of two blocks adds.
 struct Pattern {
   BlockMatrix H;
   std::vector<int> off_diagonal;
@@ -105,7 +105,7 @@ class StageProblem : public LeastSquares {
   }
 
  private:
-  // One pass over all terms; false where one is undefined.
+  // Visits all terms.  Returns false where one is undefined.
   template <bool kDerivatives>
   bool Add(const VectorXd& values, Accumulator* equations, double* cost) const {
     Linearizer<Pose, kDerivatives> linearizer(

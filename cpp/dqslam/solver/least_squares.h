@@ -1,5 +1,5 @@
-// One stage of estimation as a least-squares problem: packed values, tangent steps, normal
-// equations.
+// One stage of estimation as a least-squares problem with packed values, steps in the tangents and
+// normal equations.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,21 +14,23 @@ class LeastSquares {
  public:
   virtual ~LeastSquares() = default;
 
-  /// The parameters that take part, of a state and back into it.
+  /// Copies the parameters of the stage from a state, and back into it.
   virtual Eigen::VectorXd Pack(const State& state) const = 0;
   virtual void Unpack(const Eigen::VectorXd& values, State* state) const = 0;
 
-  /// Moved by a step in the tangents of the variables; false where that is impossible.
+  /// Moves the values by a step in the tangents of the variables.  Returns false where that is
+  /// impossible.
   virtual bool Retract(const Eigen::VectorXd& values,
                        const Eigen::VectorXd& step,
                        Eigen::VectorXd* moved) const = 0;
-  /// The same to first order, but along the path (path_step.h); false where that is impossible.
+  /// Moves along the path (path_step.h), which is the same to first order.  Returns false where
+  /// that is impossible.
   virtual bool RetractAlongPath(const Eigen::VectorXd& values,
                                 const Eigen::VectorXd& step,
                                 Eigen::VectorXd* moved) const = 0;
-  /// Returns false where a residual is undefined.
+  /// Computes the cost.  Returns false where a residual is undefined.
   virtual bool Cost(const Eigen::VectorXd& values, double* cost) const = 0;
-  /// Likewise; sets equations().
+  /// Computes equations().  Returns false where a residual is undefined.
   virtual bool Linearize(const Eigen::VectorXd& values) = 0;
   const NormalEquations& equations() const { return equations_; }
 
@@ -38,8 +40,8 @@ class LeastSquares {
   NormalEquations equations_;
 };
 
-/// Where the box residual is undefined at `state`, that box gets the tangent residual.  `prepared`
-/// must outlive the result.
+/// Makes the problem of a stage.  A box whose box residual is undefined at `state` gets the tangent
+/// residual instead.  `prepared` must outlive the result.
 std::unique_ptr<LeastSquares> MakeLeastSquares(const PreparedGraph& prepared,
                                                const SolveOptions& options,
                                                const Stage& stage,

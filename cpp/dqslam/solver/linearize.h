@@ -1,7 +1,8 @@
 // Residuals and derivatives of the terms of a stage, added up into normal equations.
 //
-// Boxes, nine tenths of all terms, are differentiated by hand (geometry/box_derivatives.h); all
-// other costs by AutoDiff on jets (geometry/jets.h).
+// Boxes are nine tenths of all terms and have derivatives written by hand
+// (geometry/box_derivatives.h).  All other costs are differentiated by AutoDiff on jets
+// (geometry/jets.h).
 #pragma once
 
 #include <ceres/loss_function.h>
@@ -19,8 +20,8 @@ namespace dqslam {
 template <int kRows, int kColumns>
 using Matrix = Eigen::Matrix<double, kRows, kColumns>;
 
-/// Residual of a box or its tangents, in sigmas, and its Jacobians; without derivatives, these stay
-/// as they are.  False where it is undefined.
+/// Computes the box or tangent residual of a box, in sigmas, and its Jacobians.  Without
+/// kDerivatives the Jacobians are left unchanged.  Returns false where the residual is undefined.
 template <typename Pose, bool kDerivatives>
 bool LinearizeBox(const PreparedGraph& prepared,
                   const StageBox& box,
@@ -53,12 +54,13 @@ bool LinearizeBox(const PreparedGraph& prepared,
   return true;
 }
 
-/// A visitor of terms that adds them up at some values, with derivatives or without.
+/// A visitor that adds up the terms at some values, with or without derivatives.
 template <typename Pose, bool kDerivatives>
 class Linearizer {
  public:
-  /// `loss` is that of whole boxes, null for none; `off_diagonal` the blocks of H that the terms of
-  /// two blocks fill, in their order; `equations` is null without derivatives.
+  /// `loss` applies to whole boxes and is null for least squares.  `off_diagonal` lists the blocks
+  /// of H to which the terms of two blocks add, in the order of these terms.  `equations` is null
+  /// without derivatives.
   Linearizer(const PreparedGraph& prepared,
              const StageTerms& terms,
              const ceres::LossFunction* loss,

@@ -1,6 +1,6 @@
-// Robust losses on whole boxes, beside those that Ceres brings.
-//   s    squared norm of a box's residual: chi-square with 4 degrees of freedom for a right box
-//   phi  the chi-square from which on a box is doubted
+// Robust losses on whole boxes, in addition to those of Ceres.
+//   s    squared norm of a box's residual: chi-square with 4 degrees of freedom for an inlier
+//   phi  the chi-square above which a box is doubted
 #pragma once
 
 #include <ceres/loss_function.h>
@@ -11,8 +11,8 @@
 
 namespace dqslam {
 
-/// Dynamic covariance scaling, Agarwal et al. 2013: weight (2 phi / (phi + s))^2 beyond phi, hence
-/// rho(s) = 3 phi - 4 phi^2 / (phi + s) there.
+/// Dynamic covariance scaling, Agarwal et al. 2013.  Beyond phi the weight is
+/// (2 phi / (phi + s))^2, hence rho(s) = 3 phi - 4 phi^2 / (phi + s).
 class DcsLoss : public ceres::LossFunction {
  public:
   explicit DcsLoss(double phi) : phi_(phi) {}
@@ -33,8 +33,8 @@ class DcsLoss : public ceres::LossFunction {
   double phi_;
 };
 
-/// The loss function of a stage; null for the plain sum of squares, which switchable constraints
-/// and graduated non-convexity weight themselves.
+/// The loss function of a stage, or null for the plain sum of squares.  It is null for switchable
+/// constraints and graduated non-convexity too, because they weight the boxes themselves.
 inline std::unique_ptr<ceres::LossFunction> MakeLoss(Loss loss, const SolveOptions& options) {
   switch (loss) {
     case Loss::kHuber:

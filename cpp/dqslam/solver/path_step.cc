@@ -12,7 +12,7 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-// The tangent of a pose in space, in the frame of the pose.
+// The tangent of an SE(2) or SE(3) pose as a motion in space, in the frame of the pose.
 struct Twist {
   Vector3d translation, rotation;
 };
@@ -35,8 +35,9 @@ Eigen::Matrix<double, Pose::kTangentSize, 1> OfPose(const Twist& twist) {
   }
 }
 
-// The tangent of an ellipsoid S = L L^T that turns about its center, dS = [w] S - S [w]; what of
-// L^-1 dS L^-T is below the diagonal, and half of what is on it, as in EllipsoidManifold::Minus.
+// The tangent of an ellipsoid S = L L^T that turns about its center, dS = [w] S - S [w].  It
+// consists of the part of L^-1 dS L^-T below the diagonal and half of the diagonal, as in
+// EllipsoidManifold::Minus.
 Vector9d TurnTangent(const Matrix3d& L, const Vector3d& rotation) {
   Matrix3d turned;
   for (int column = 0; column < 3; ++column) turned.col(column) = rotation.cross(L.col(column));
@@ -51,8 +52,8 @@ Vector9d TurnTangent(const Matrix3d& L, const Vector3d& rotation) {
 
 }  // namespace
 
-// With z the pose seen from the previous one, T' = T (1 + tangent) gives to first order
-// z' = z (1 + own - Ad(z^-1) of the previous).
+// Let z be the pose relative to the previous one.  T' = T (1 + tangent) of both poses gives, to
+// first order, z' = z (1 + own tangent - Ad(z^-1) previous tangent).
 template <typename Pose>
 void PlusBehind(const MovedPose& previous,
                 const double* pose,

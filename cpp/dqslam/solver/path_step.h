@@ -1,12 +1,12 @@
-// A step, taken along the path instead of straight.
+// A step that is taken along the path instead of straight.
 //
-// Plus moves each pose and each object by itself. Where a long path turns as a whole, by theta,
-// each goes along its tangent, and the path gets longer by theta^2 / 2 of itself: odometry does not
-// forgive that, and the step must be cut again and again. Here the same step is read as a change of
-// each pose relative to the one before it, and of each object relative to a pose that sees it; then
-// the path is put together anew. Both are the same to first order, and a turn of everything is
-// exact. (Olson, Leonard & Teller 2006 parametrize poses this way; here the equations stay those of
-// Plus, and sparse.)
+// Plus moves each pose and each object by itself. When a long path turns as a whole by theta, each
+// pose moves along its tangent, and the path gets longer by the fraction theta^2 / 2. Odometry
+// penalizes that so much that the step must be shortened again and again. Here the step is
+// interpreted as a change of each pose relative to the pose before it, and of each object relative
+// to a pose that observes it; then the path is composed again. Both steps are the same to first
+// order, and here a rotation of everything is exact. (Olson, Leonard & Teller 2006 parametrize
+// poses in this way; here the equations remain those of Plus, and sparse.)
 #pragma once
 
 #include "dqslam/geometry/ellipsoid.h"
@@ -28,8 +28,8 @@ void PlusBehind(const MovedPose& previous,
                 const double* tangent,
                 double* moved);
 
-/// Moves an ellipsoid by its tangent (EllipsoidManifold) relative to a moved pose; false where
-/// that is impossible.
+/// Moves an ellipsoid by its tangent (EllipsoidManifold) relative to a moved pose.  Returns false
+/// where that is impossible.
 template <typename Pose>
 bool PlusBeside(const MovedPose& viewer,
                 const double* ellipsoid,

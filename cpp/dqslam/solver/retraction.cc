@@ -60,7 +60,7 @@ class Step {
   VectorXd& moved_;
 };
 
-// The last pose to see each object, by row; the first of all where no box has a weight.
+// The row of the last pose that observes each object; without a box, the first pose of the stage.
 std::vector<int> Viewers(const Graph& graph, const StageTerms& terms) {
   std::vector<int> viewers(graph.num_objects(), terms.variables.first_pose);
   for (const StageBox& box : terms.boxes) {

@@ -5,14 +5,14 @@
 
 namespace dqslam {
 
-/// False where that is impossible.
+/// Moves each variable by itself.  Returns false where that is impossible.
 template <typename Pose>
 bool Retract(const VariableIndex& variables,
              const Eigen::VectorXd& values,
              const Eigen::VectorXd& step,
              Eigen::VectorXd* moved);
 
-/// The same to first order; false where that is impossible.
+/// Moves along the path, which is the same to first order.  Returns false where that is impossible.
 template <typename Pose>
 bool RetractAlongPath(const PreparedGraph& prepared,
                       const StageTerms& terms,

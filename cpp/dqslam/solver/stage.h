@@ -1,4 +1,4 @@
-// One stage of estimation: some poses, some boxes, one residual, one minimizer.
+// One stage of estimation: it has some poses, some boxes, one residual and one minimizer.
 #pragma once
 
 #include <vector>
@@ -8,36 +8,36 @@
 
 namespace dqslam {
 
-/// Whether a residual is one of the paper's, which only Ceres minimizes.
+/// Whether a residual is one of the paper's.  Only Ceres minimizes these.
 inline bool IsAlgebraic(Residual residual) {
   return residual == Residual::kAlgebraic || residual == Residual::kAlgebraicNormalized;
 }
 
-/// Which part of the graph takes part, and how.
+/// The part of the graph that a stage uses, and how it is minimized.
 struct Stage {
   int first_free_pose = 1;                 ///< poses before it are constant
-  int end_pose = 0;                        ///< poses from it on take no part
-  std::vector<int> boxes;                  ///< rows that take part; their objects do too
-  std::vector<double> weights;             ///< of these boxes, in [0, 1]; empty: all 1
-  Residual residual = Residual::kTangent;  ///< not kTangentThenBox
-  Loss loss = Loss::kNone;                 ///< GNC: of the boxes' weights, not of this stage
+  int end_pose = 0;                        ///< poses from this one on are not in the stage
+  std::vector<int> boxes;                  ///< rows of the boxes in the stage, with their objects
+  std::vector<double> weights;             ///< of these boxes, in [0, 1]; if empty, all are 1
+  Residual residual = Residual::kTangent;  ///< any but kTangentThenBox
+  Loss loss = Loss::kNone;                 ///< GNC changes the weights and acts as kNone here
   Minimizer minimizer = Minimizer::kDogleg;
   int max_iterations = 100;
-  double function_tolerance = 1e-10;  ///< stop when |change of cost| / cost falls below
+  double function_tolerance = 1e-10;  ///< stops when |change of cost| / cost is at most this
 };
 
-/// Minimizes from `state` and writes the result there, natively where that is possible: boxes and
-/// tangents of ellipsoids.  Ceres minimizes what only the paper's method and switchable constraints
-/// need, and everything with Backend::kCeres.  Where the box residual is undefined at the
-/// start of the stage, that box uses the tangent residual.  Throws Interrupted.
+/// Minimizes from `state` and writes the result there.  The native solver minimizes box and tangent
+/// residuals of ellipsoids.  Ceres minimizes stages with algebraic residuals, dual quadrics or
+/// switchable constraints, and every stage with Backend::kCeres.  A box whose box residual is
+/// undefined at the start of the stage uses the tangent residual.  Throws Interrupted.
 Summary Optimize(const PreparedGraph& prepared,
                  const SolveOptions& options,
                  const Stage& stage,
                  const Monitor& monitor,
                  State* state);
 
-/// Half the squared Mahalanobis distance of each box from its prediction; infinite where the object
-/// is not strictly in front.
+/// Half the squared Mahalanobis distance of each box from its prediction.  It is infinite where the
+/// object is not strictly in front of the camera.
 Eigen::VectorXd BoxCosts(const PreparedGraph& prepared,
                          const SolveOptions& options,
                          const State& state);

@@ -1,4 +1,4 @@
-// What takes part in a stage: rows of the tables of the graph, fixed while the stage runs.
+// The terms of a stage, as rows of the tables of the graph.  They are fixed while the stage runs.
 #pragma once
 
 #include <vector>
@@ -8,16 +8,16 @@
 
 namespace dqslam {
 
-/// Which residual a box has in a stage.
+/// The residual that a box has in a stage.
 struct BoxResidual {
-  Residual residual = Residual::kBox;  ///< not kTangentThenBox
-  double depth = 0;                    ///< at which tangents turn into pixels, meters; 0: not used
+  Residual residual = Residual::kBox;  ///< any but kTangentThenBox
+  double depth = 0;                    ///< meters; it scales tangent residuals to pixels
   EdgeFlags one_sided = EdgeFlags::Constant(false);
 };
 
 struct StageBox {
   int row;        ///< in the table of boxes
-  double weight;  ///< of its loss
+  double weight;  ///< the factor of its loss
   BoxResidual residual;
 };
 
@@ -28,8 +28,8 @@ struct StageTerms {
   std::vector<std::vector<int>> measurements;  ///< rows, one list a table
 };
 
-/// Terms of the stage, and the poses and objects that they are about.  A box whose own residual is
-/// undefined at `state` gets the tangent residual.
+/// The terms of a stage, with their poses and objects.  A box whose residual is undefined at
+/// `state` gets the tangent residual instead.
 StageTerms SelectTerms(const PreparedGraph& prepared,
                        const SolveOptions& options,
                        const Stage& stage,

@@ -8,13 +8,14 @@ namespace {
 
 using Eigen::VectorXd;
 
-// The constants are those of Ceres, but for two.  Its trust region grows threefold at most.  And it
-// damps dog-leg's Gauss-Newton step by 1e-8 of the curvature, which then creeps along the weakest
-// modes of a long path: they have 3e-15 of it at 200 000 poses.
+// The constants are those of Ceres, except for two.  In Ceres, the trust region grows at most
+// threefold in a step.  Ceres also damps the Gauss-Newton step of dog-leg by 1e-8 of the curvature,
+// which makes progress slow along the weakest modes of a long path: at 200 000 poses, their
+// curvature is only 3e-15 of the largest.
 constexpr double kSmallestScale = 1e-6, kLargestScale = 1e32;
 constexpr double kLargestRadius = 1e16;
-constexpr double kDampedRadius = 1e4;  // where Levenberg-Marquardt starts
-constexpr double kFastestGrowth = 10;  // of the radius, in one step
+constexpr double kDampedRadius = 1e4;  // the first radius of Levenberg-Marquardt
+constexpr double kFastestGrowth = 10;  // the largest factor of the radius in one step
 constexpr double kLeastDamping = 1e-16, kMostDamping = 1;
 
 class LevenbergMarquardt : public Strategy {
@@ -41,7 +42,7 @@ class LevenbergMarquardt : public Strategy {
   double shrinkage_ = 2;
 };
 
-// Powell's: where the whole Gauss-Newton step fails, shorter ones cost no further factorization.
+// Powell's dog-leg.  If the whole Gauss-Newton step fails, shorter steps need no new factorization.
 class Dogleg : public Strategy {
  public:
   using Strategy::Strategy;

@@ -1,4 +1,4 @@
-// How far a step goes, and where: Levenberg-Marquardt and Powell's dog-leg.
+// The length and direction of steps, by Levenberg-Marquardt or by Powell's dog-leg.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,8 +10,8 @@
 
 namespace dqslam {
 
-/// Gain ratios, of a decrease to the one that the model predicts: below the first, a step went
-/// beyond what the model is good for; above the second, the model is good.
+/// Limits of the gain ratio, which is the decrease of the cost divided by the decrease that the
+/// quadratic model predicts.  The model is poor below the first limit and good above the second.
 constexpr double kPoorGain = 0.25, kGoodGain = 0.75;
 
 /// The state of a trust region, with the factorization behind its steps.
@@ -19,20 +19,21 @@ class Strategy {
  public:
   Strategy(const BlockMatrix& H, double radius) : radius_(radius), cholesky_(H) {}
   virtual ~Strategy() = default;
-  /// The step for equations that have not changed since the last call unless is_new; false where
-  /// there is none.
+  /// Computes the step.  `is_new` is false if the equations are those of the last call.  Returns
+  /// false where there is no step.
   virtual bool Step(const NormalEquations& equations, bool is_new, Eigen::VectorXd* step) = 0;
   virtual void Accept(double gain_ratio) = 0;
   virtual void Reject() = 0;
   virtual void RejectInvalid() = 0;
-  /// Whether the trust region cut the step: then a small change of cost says nothing.
+  /// Whether the trust region shortened the step.  If so, a small change of cost does not mean
+  /// convergence.
   virtual bool IsLimited() const { return false; }
   double radius() const { return radius_; }
 
  protected:
-  /// Squared scale of each variable: the curvature, within limits that are relative to the first.
+  /// Squared scale of each variable: the diagonal of H, within limits.
   Eigen::VectorXd Curvature(const NormalEquations& equations);
-  /// The step that damps each variable by so much; false where there is none.
+  /// Computes the step with a damping for each variable.  Returns false where there is no step.
   bool Solve(const NormalEquations& equations,
              const Eigen::VectorXd& damping,
              Eigen::VectorXd* step);
@@ -44,7 +45,7 @@ class Strategy {
   Eigen::VectorXd first_scale_;
 };
 
-/// `H` is only looked at for its pattern.
+/// Makes a strategy for matrices with the pattern of `H`.
 std::unique_ptr<Strategy> MakeStrategy(Minimizer minimizer, const BlockMatrix& H);
 
 }  // namespace dqslam

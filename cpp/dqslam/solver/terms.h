@@ -1,10 +1,10 @@
-// Every term of a stage, enumerated once: which cost, between which poses and objects.  The native
-// normal equations, Ceres and the covariances are visitors of it; sessions share its priors and its
-// kinds of measurements.
+// The one enumeration of the terms of a stage: each cost, and the poses and objects that it is
+// between.  The native normal equations, Ceres and the covariances visit it.  Sessions share its
+// priors and its kinds of measurements.
 //
 // A visitor has two methods, both of which return false to stop:
-//   Visit(cost, blocks...)   a functor of costs/, and a PoseRow or an ObjectRow for each block
-//   VisitBox(box)            a StageBox, whose cost VisitBoxCost() names
+//   Visit(cost, blocks...)   gets a functor of costs/, and a PoseRow or an ObjectRow for each
+//   block. VisitBox(box)            gets a StageBox; VisitBoxCost() gives its cost.
 #pragma once
 
 #include <utility>
@@ -31,7 +31,7 @@ ObjectParameters ParametersOf(ObjectRow, const double* values) {
   return {values};
 }
 
-/// Calls visit(cost) with the cost of a box, and returns what that returns.
+/// Calls visit(cost) with the cost of a box, and returns the result of the call.
 template <typename Pose, typename Landmark, typename Visit>
 auto VisitBoxCost(const PreparedGraph& prepared,
                   const SolveOptions& options,
@@ -58,7 +58,7 @@ auto VisitBoxCost(const PreparedGraph& prepared,
       {}, camera, mount, observed, sqrt_information, role.depth, role.one_sided});
 }
 
-/// Calls visit(cost) with each prior on an ellipsoid; false where a call returns false.
+/// Calls visit(cost) with each prior on an ellipsoid.  Returns false where a call returns false.
 template <typename Visit>
 bool VisitObjectPriors(double log_size_mean,
                        double log_size_sigma,
@@ -72,7 +72,7 @@ bool VisitObjectPriors(double log_size_mean,
          visit(SupportPlaneCost{{}, scene.up, scene.plane_offset, scene.support_sigma});
 }
 
-/// Calls visit(cost) with each prior on a pose; false where a call returns false.
+/// Calls visit(cost) with each prior on a pose.  Returns false where a call returns false.
 template <typename Pose, typename Visit>
 bool VisitPosePriors(const Mount& mount, const ScenePriors& scene, Visit&& visit) {
   return scene.camera_height_sigma == 0 || visit(CameraHeightCost<Pose>{{},
@@ -83,7 +83,7 @@ bool VisitPosePriors(const Mount& mount, const ScenePriors& scene, Visit&& visit
                                                                         scene.camera_height_sigma});
 }
 
-/// Visits all terms; false where a visit returned false.
+/// Visits all terms.  Returns false where a visit returned false.
 template <typename Pose, typename Landmark, typename Visitor>
 bool VisitTerms(const PreparedGraph& prepared, const StageTerms& terms, Visitor* visitor) {
   const Graph& graph = prepared.graph;

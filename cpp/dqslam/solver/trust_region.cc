@@ -16,10 +16,10 @@ constexpr double kSmallestRadius = 1e-32;
 constexpr double kSufficientDecrease = 1e-3;  // of the decrease that the model predicts
 constexpr double kTinyStep = 1e-12;           // relative to the values
 constexpr double kTinyGradient = 1e-12;
-// An invalid step is a step into impossible geometry: shrink and go on.
+// An invalid step leads into impossible geometry.  The trust region shrinks and the loop continues.
 constexpr int kMaxInvalidSteps = 50;
 
-// Adds the time of its life to a counter.
+// Adds the time between its construction and its destruction to a counter.
 class Stopwatch {
  public:
   explicit Stopwatch(double* seconds) : seconds_(*seconds) {}
@@ -32,13 +32,14 @@ class Stopwatch {
   std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
 };
 
-// Where a step leads.
+// The values and the cost after a step.
 class Trial {
  public:
   explicit Trial(const LeastSquares& problem) : problem_(problem) {}
 
-  // Goes straight, or along the path where straight wins little of the decrease that the model
-  // predicts, and less. Returns the decrease: minus infinity where a residual is undefined.
+  // Takes the straight step. If its decrease is poor compared with the one that the model predicts,
+  // tries the step along the path as well and takes the better one. Returns the decrease, which is
+  // minus infinity where a residual is undefined.
   double Take(const VectorXd& values, const VectorXd& step, double predicted) {
     const double before = problem_.equations().cost;
     cost_ = CostOf(problem_.Retract(values, step, &reached_), reached_);
@@ -164,7 +165,7 @@ Summary Minimize(const TrustRegionOptions& options,
     strategy->Accept(decrease / predicted);
     values->swap(trial.reached());
     summary.final_cost = trial.cost();
-    if (summary.converged) break;  // the derivatives there are not needed
+    if (summary.converged) break;  // Derivatives at the end are not needed.
     problem.Linearize(*values);
     is_new = true;
     summary.gradient_norm_end = LargestOf(equations.gradient);

@@ -1,7 +1,7 @@
 // Levenberg-Marquardt and Powell's dog-leg on normal equations, as Ceres' manual describes them.
-// Levenberg-Marquardt starts damped, for stages far from their minimum; dog-leg starts with the
-// whole Gauss-Newton step, for stages near it, and follows the bent valleys of objects whose tilt
-// the boxes hardly determine.
+// Levenberg-Marquardt starts with damping and is used for stages far from their minimum.  Dog-leg
+// starts with the whole Gauss-Newton step and is used for stages near it; it also follows the
+// curved valleys of the cost that belong to objects whose tilt the boxes hardly determine.
 #pragma once
 
 #include "dqslam/solver/least_squares.h"
@@ -14,7 +14,7 @@ struct TrustRegionOptions {
   double function_tolerance = 1e-10;
 };
 
-/// Minimizes from `values` on and writes the result there.  Throws Interrupted.
+/// Minimizes from `values` and writes the result there.  Throws Interrupted.
 Summary Minimize(const TrustRegionOptions& options,
                  const Monitor& monitor,
                  LeastSquares* problem,

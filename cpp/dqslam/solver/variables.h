@@ -1,4 +1,5 @@
-// The variables of a stage in one vector: poses, then objects; those that are constant lead.
+// The variables of a stage in one vector: first the poses, of which the constant ones come first,
+// then the objects.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,7 +10,7 @@
 
 namespace dqslam {
 
-/// A block of a term: a row of the state.
+/// A block of a term, as a row of the poses or of the landmarks of a state.
 struct PoseRow {
   int row;
 };
@@ -21,34 +22,34 @@ struct ObjectRow {
 template <typename Pose, typename Row>
 inline constexpr int kTangentOf = std::is_same_v<Row, PoseRow> ? Pose::kTangentSize : kLandmarkSize;
 
-/// Where each pose and object stands in the vector of values, in a step, and among the blocks of
+/// The place of each pose and object in the vector of values, in a step, and among the blocks of
 /// the normal equations.
 struct VariableIndex {
   int pose_size = 0, tangent_size = 0;
-  int first_pose = 0, end_pose = 0;  ///< whose values are packed
-  int first_free_pose = 0;           ///< poses before it are constant, and have no block
-  std::vector<int> objects;          ///< rows, ascending
-  std::vector<int> slot_of_object;   ///< place in `objects`; -1: takes no part
+  int first_pose = 0, end_pose = 0;  ///< the range of poses whose values are packed
+  int first_free_pose = 0;           ///< poses before it are constant and have no block
+  std::vector<int> objects;          ///< rows of the objects in the stage, ascending
+  std::vector<int> slot_of_object;   ///< place in `objects`, or -1 for an object not in the stage
 
   int num_poses() const { return end_pose - first_pose; }
   int num_free_poses() const { return end_pose > first_free_pose ? end_pose - first_free_pose : 0; }
   int num_objects() const { return static_cast<int>(objects.size()); }
 
-  /// Places in the vector of values.
+  /// The first place of a pose or an object in the vector of values.
   int Start(PoseRow pose) const { return (pose.row - first_pose) * pose_size; }
   int Start(ObjectRow object) const {
     return num_poses() * pose_size + slot_of_object[object.row] * kLandmarkSize;
   }
   int num_values() const { return num_poses() * pose_size + num_objects() * kLandmarkSize; }
 
-  /// Blocks of the normal equations; below zero: constant.
+  /// The block of a pose or an object in the normal equations, below zero if it is constant.
   int Block(PoseRow pose) const {
     return pose.row < first_free_pose ? -1 : pose.row - first_free_pose;
   }
   int Block(ObjectRow object) const { return num_free_poses() + slot_of_object[object.row]; }
   std::vector<int> BlockSizes() const;
 
-  /// Places in a step; below zero: constant.
+  /// The first place of a pose or an object in a step, below zero if it is constant.
   int Tangent(PoseRow pose) const { return Block(pose) * tangent_size; }
   int Tangent(ObjectRow object) const {
     return num_free_poses() * tangent_size + slot_of_object[object.row] * kLandmarkSize;

@@ -10,7 +10,7 @@ from dqslam.plot.frame import draw_boxes, rectangle, visible_outlines
 from dqslam.plot.labels import place_labels
 from dqslam.plot.style import (
     COLUMN_INCHES,
-    GREY,
+    GRAY,
     class_styles,
     column_style,
     new_figure,
@@ -111,7 +111,7 @@ def _draw_legend(figure: "Figure", fits: BoxFits, poses: list[int]) -> None:
     if (here & fits.boxes.held_out).any():
         handles.insert(1, Line2D([], [], color="0.2", linestyle=":", label="held out"))
     if (here & (fits.object_row < 0)).any():
-        handles.append(Line2D([], [], color=GREY, label="not in the map"))
+        handles.append(Line2D([], [], color=GRAY, label="not in the map"))
     figure.legend(
         handles=handles,
         loc="outside lower center",

@@ -9,7 +9,7 @@ from dqslam._checks import Bools, Floats, Ints
 from dqslam.evaluation import BoxFits
 from dqslam.io import Results
 from dqslam.metrics import boxes_through_lens, project_outlines, through_lens
-from dqslam.plot.style import GREY
+from dqslam.plot.style import GRAY
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,7 +26,7 @@ def draw_boxes(
     *,
     lens: bool,
     linewidth: float,
-    unmapped: str = GREY,
+    unmapped: str = GRAY,
 ) -> Ints:
     """Draw what the detector saw from a pose, and return the rows of the objects that it shows.
 

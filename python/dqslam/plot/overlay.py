@@ -54,7 +54,7 @@ class Overlay:
             )
         axes.clear()
         axes.set_axis_off()
-        # Grey as it is, not stretched over what occurs: floats are shares, integers bytes.
+        # Gray as it is, not stretched over what occurs: floats are shares, integers bytes.
         white = 1.0 if pixels.dtype.kind == "f" else float(np.iinfo(pixels.dtype).max)
         axes.imshow(
             pixels, cmap="gray", vmin=0.0, vmax=white, interpolation="nearest", aspect="auto"

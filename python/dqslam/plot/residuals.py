@@ -8,7 +8,7 @@ from dqslam._checks import Floats
 from dqslam.evaluation import BoxFits
 from dqslam.plot.style import (
     COLUMN_INCHES,
-    GREY,
+    GRAY,
     ORANGE,
     SKY,
     column_style,
@@ -76,7 +76,7 @@ def _draw_histogram(axes: "Axes", used: Floats, held_out: Floats, bins: Floats) 
         )  # fmt: skip
         beyond = [bars[-1]] if bins[0] == 0.0 else [bars[0], bars[-1]]
         for bar in beyond:
-            bar.set(facecolor=(SKY, 0.5), hatch="/////", edgecolor=GREY)
+            bar.set(facecolor=(SKY, 0.5), hatch="/////", edgecolor=GRAY)
     if held_out.size:
         density, _ = np.histogram(held_out.clip(*inside), bins, density=True)
         axes.stairs(density, bins, color=ORANGE, linewidth=1.0, gid="held out")
@@ -88,7 +88,7 @@ def _draw_legend(figure: "Figure", *, any_held_out: bool) -> None:
 
     handles: list[Line2D | Patch] = [
         Patch(facecolor=SKY, label="boxes used"),
-        Patch(facecolor=(SKY, 0.5), hatch="/////", edgecolor=GREY, linewidth=0, label="beyond"),
+        Patch(facecolor=(SKY, 0.5), hatch="/////", edgecolor=GRAY, linewidth=0, label="beyond"),
         Line2D([], [], color="black", label="expected"),
     ]
     if any_held_out:

@@ -20,7 +20,7 @@ from dqslam.io.files import write_text
 from dqslam.view.scene import Scene, SceneObject, Spread
 
 _STATIC = Path(__file__).with_name("static")
-# Micrometres and microradians: more would only make the file larger.
+# Micrometers and microradians: more would only make the file larger.
 _DECIMALS = 6
 
 
@@ -80,7 +80,7 @@ def _object(one: SceneObject) -> dict[str, Any]:
 def _spread(one: Spread) -> dict[str, Any]:
     return {
         "center": _rounded(one.center),
-        "semiAxes": one.semi_axes.tolist(),  # which may be far below a micrometre
+        "semiAxes": one.semi_axes.tolist(),  # which may be far below a micrometer
         "orientation": _rounded(one.orientation_xyzw),
     }
 

@@ -2,7 +2,7 @@
 
 Meters; the camera's x points right, y down, z forward. The first line is frame 0, each next line
 one more: there are no times, see `dqslam.io.frames`. In KITTI's odometry benchmark the camera is
-number 0, the left grey one; boxes in the images of camera 2 are 6 cm beside it.
+number 0, the left gray one; boxes in the images of camera 2 are 6 cm beside it.
 """
 
 from __future__ import annotations
