@@ -47,7 +47,7 @@ struct Reference {
             const Stage& stage,
             State state) {
     ceres::Problem problem;
-    MakeCeresProblem(prepared, options, stage, &state, &problem);
+    MakeCeresProblem({prepared, options, {}}, stage, &state, &problem);
     ceres::Problem::EvaluateOptions evaluate;
     for (int pose = stage.first_free_pose; pose < stage.end_pose; ++pose) {
       evaluate.parameter_blocks.push_back(state.poses.row(pose).data());
@@ -87,7 +87,7 @@ class LeastSquaresOf : public testing::Test {
   void ExpectCeres(const SolveOptions& options, const Stage& stage) {
     const PreparedGraph prepared(displaced_.scene.graph, false);
     const Reference expected(prepared, options, stage, state_);
-    const auto problem = MakeLeastSquares(prepared, options, stage, state_);
+    const auto problem = MakeLeastSquares({prepared, options, {}}, stage, state_);
     const Eigen::VectorXd values = problem->Pack(state_);
     double cost = 0;
     ASSERT_TRUE(problem->Cost(values, &cost));
@@ -147,7 +147,8 @@ TYPED_TEST(LeastSquaresOf, ConstantPosesHaveNoColumns) {
 
 TYPED_TEST(LeastSquaresOf, ValuesComeBackAsTheyWere) {
   const PreparedGraph prepared(this->displaced_.scene.graph, false);
-  const auto problem = MakeLeastSquares(prepared, {}, this->AllOf(Residual::kBox), this->state_);
+  const auto problem =
+      MakeLeastSquares({prepared, {}, {}}, this->AllOf(Residual::kBox), this->state_);
   State back = this->displaced_.scene.truth;
   back.poses.row(0) = this->state_.poses.row(0);  // it is constant
   problem->Unpack(problem->Pack(this->state_), &back);
@@ -160,7 +161,7 @@ TYPED_TEST(LeastSquaresOf, AlongThePathIsPlusToFirstOrder) {
   const PreparedGraph prepared(this->displaced_.scene.graph, false);
   Stage stage = this->AllOf(Residual::kBox);
   const SolveOptions options;
-  const auto problem = MakeLeastSquares(prepared, options, stage, this->state_);
+  const auto problem = MakeLeastSquares({prepared, options, {}}, stage, this->state_);
   const Eigen::VectorXd values = problem->Pack(this->state_);
   Random random(8);
   const Eigen::VectorXd step = Eigen::VectorXd::NullaryExpr(problem->equations().H.rows(),
@@ -208,7 +209,8 @@ TYPED_TEST(LeastSquaresOf, InformationIsThatOfCeres) {
 
 TYPED_TEST(LeastSquaresOf, AnObjectBehindTheCameraHasNoCost) {
   const PreparedGraph prepared(this->displaced_.scene.graph, false);
-  const auto problem = MakeLeastSquares(prepared, {}, this->AllOf(Residual::kBox), this->state_);
+  const auto problem =
+      MakeLeastSquares({prepared, {}, {}}, this->AllOf(Residual::kBox), this->state_);
   State far = this->state_;
   far.landmarks.col(0).array() += 1000;
   double cost = 0;

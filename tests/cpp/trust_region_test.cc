@@ -146,13 +146,13 @@ TYPED_TEST_SUITE(HingeOf, PoseTypes);
 TYPED_TEST(HingeOf, TurnsTheWholePathInAStep) {
   const Scene scene = MakeScene<TypeParam>();
   const PreparedGraph prepared(scene.graph, false);
-  Stage stage = BatchStage(prepared, {});
+  Stage stage = BatchStage({prepared, {}, {}});
   const auto from_the_first = [&](int row) { return scene.graph.boxes.pose[row] == 0; };
   stage.boxes.erase(std::remove_if(stage.boxes.begin(), stage.boxes.end(), from_the_first),
                     stage.boxes.end());
   State state = Hinged<TypeParam>(scene.truth);
   const SolveOptions options;
-  const auto problem = MakeLeastSquares(prepared, options, stage, state);
+  const auto problem = MakeLeastSquares({prepared, options, {}}, stage, state);
   Eigen::VectorXd values = problem->Pack(state);
   const Summary summary = Minimize(OptionsOf(Minimizer::kDogleg), nullptr, problem.get(), &values);
   problem->Unpack(values, &state);

@@ -33,17 +33,14 @@ bool ThrowsBoxesOut(Loss loss) {
   return IsRobust(loss) && loss != Loss::kHuber && loss != Loss::kCauchy;
 }
 
-Summary GraduateNonConvexity(const PreparedGraph& prepared,
-                             const SolveOptions& options,
-                             const Monitor& monitor,
-                             State* state) {
-  const bool truncated = options.loss == Loss::kGncTls;
-  const double c2 = options.outlier_chi_square;
-  Stage stage = BatchStage(prepared, options);
+Summary GraduateNonConvexity(const SolveContext& context, State* state) {
+  const bool truncated = context.options.loss == Loss::kGncTls;
+  const double c2 = context.options.outlier_chi_square;
+  Stage stage = BatchStage(context);
   stage.loss = Loss::kNone;
   stage.minimizer = Minimizer::kLevenbergMarquardt;
   stage.max_iterations = kRoundIterations;
-  stage.function_tolerance = options.grow_tolerance;
+  stage.function_tolerance = context.options.grow_tolerance;
   stage.weights.assign(stage.boxes.size(), 1.0);
 
   // Yang et al. start with a surrogate that is convex over all residuals, which leads to a fit of
@@ -53,33 +50,31 @@ Summary GraduateNonConvexity(const PreparedGraph& prepared,
   double mu = truncated ? c2 / (2 * largest - c2) : 2 * largest / c2;
   Summary total;
   for (int round = 0; round < kMaxRounds; ++round) {
-    const Eigen::VectorXd costs = BoxCosts(prepared, options, *state);
+    const Eigen::VectorXd costs = BoxCosts(context, *state);
     bool decided = true;
     for (size_t i = 0; i < stage.boxes.size(); ++i) {
-      const double weight = Weight(options.loss, 2 * costs[stage.boxes[i]], c2, mu);
+      const double weight = Weight(context.options.loss, 2 * costs[stage.boxes[i]], c2, mu);
       decided = decided && (weight == 0 || weight == 1);
       stage.weights[i] = weight;
     }
-    Append(Optimize(prepared, options, stage, monitor, state), &total);
+    Append(Optimize(context, stage, state), &total);
     if (truncated ? decided && round > 0 : mu <= 1) break;
     mu = truncated ? mu * kGraduation : std::max(mu / kGraduation, 1.0);
   }
   // The final stage uses the inliers only and runs until it converges.
-  const std::vector<bool> inliers = InlierBoxes(prepared, options, *state);
+  const std::vector<bool> inliers = InlierBoxes(context, *state);
   for (size_t i = 0; i < stage.boxes.size(); ++i) stage.weights[i] = inliers[stage.boxes[i]];
-  stage.minimizer = options.minimizer;
-  stage.max_iterations = options.max_iterations;
-  stage.function_tolerance = options.function_tolerance;
-  Append(Optimize(prepared, options, stage, monitor, state), &total);
+  stage.minimizer = context.options.minimizer;
+  stage.max_iterations = context.options.max_iterations;
+  stage.function_tolerance = context.options.function_tolerance;
+  Append(Optimize(context, stage, state), &total);
   return total;
 }
 
-std::vector<bool> InlierBoxes(const PreparedGraph& prepared,
-                              const SolveOptions& options,
-                              const State& state) {
-  const Eigen::VectorXd costs = BoxCosts(prepared, options, state);
+std::vector<bool> InlierBoxes(const SolveContext& context, const State& state) {
+  const Eigen::VectorXd costs = BoxCosts(context, state);
   std::vector<bool> inliers;
-  for (const double cost : costs) inliers.push_back(2 * cost <= options.outlier_chi_square);
+  for (const double cost : costs) inliers.push_back(2 * cost <= context.options.outlier_chi_square);
   return inliers;
 }
 

@@ -15,14 +15,9 @@ bool ThrowsBoxesOut(Loss loss);
 /// Graduated non-convexity, Yang et al. 2020, with truncated least squares or Geman-McClure.  It
 /// weights whole boxes; odometry is a known inlier.  It starts at the state and ends with weights
 /// that are 0 or 1.
-Summary GraduateNonConvexity(const PreparedGraph& prepared,
-                             const SolveOptions& options,
-                             const Monitor& monitor,
-                             State* state);
+Summary GraduateNonConvexity(const SolveContext& context, State* state);
 
 /// Boxes whose chi-square at the state is at most options.outlier_chi_square.
-std::vector<bool> InlierBoxes(const PreparedGraph& prepared,
-                              const SolveOptions& options,
-                              const State& state);
+std::vector<bool> InlierBoxes(const SolveContext& context, const State& state);
 
 }  // namespace dqslam

@@ -9,19 +9,20 @@ namespace {
 
 // The end of the range of poses to add at `begin`.  It has options.grow_poses poses, and more as
 // long as the sigma of odometry's rotation since `begin` is at most options.grow_rotation.
-int EndOfAddition(const PreparedGraph& prepared, const SolveOptions& options, int begin) {
-  const OdometryTable& odometry = prepared.graph.odometry;
-  const int k = prepared.graph.tangent_size();
-  const int rotations = prepared.graph.pose_model == PoseModel::kSe2 ? 1 : 3;
+int EndOfAddition(const SolveContext& context, int begin) {
+  const OdometryTable& odometry = context.graph().odometry;
+  const int k = context.graph().tangent_size();
+  const int rotations = context.graph().pose_model == PoseModel::kSe2 ? 1 : 3;
   double variance = 0;
   int end = begin;
-  for (; end < prepared.graph.num_poses(); ++end) {
+  for (; end < context.graph().num_poses(); ++end) {
     if (end > 0) {
-      const double* covariance = odometry.covariance.row(prepared.odometry_into[end]).data();
+      const double* covariance =
+          odometry.covariance.row(context.prepared.odometry_into[end]).data();
       for (int axis = k - rotations; axis < k; ++axis) variance += covariance[axis * k + axis];
     }
-    const bool drifted = variance > options.grow_rotation * options.grow_rotation;
-    if (drifted && end - begin >= options.grow_poses) break;
+    const bool drifted = variance > context.options.grow_rotation * context.options.grow_rotation;
+    if (drifted && end - begin >= context.options.grow_poses) break;
   }
   return end;
 }
@@ -45,20 +46,19 @@ std::vector<View> ViewsOf(const PreparedGraph& prepared,
   return views;
 }
 
-Vector9d StartObject(const PreparedGraph& prepared,
-                     const SolveOptions& options,
+Vector9d StartObject(const SolveContext& context,
                      const State& state,
                      int object,
                      const std::vector<int>& boxes) {
-  const Graph& graph = prepared.graph;
-  const std::vector<View> views = ViewsOf(prepared, state, boxes);
+  const Graph& graph = context.graph();
+  const std::vector<View> views = ViewsOf(context.prepared, state, boxes);
   const SizePrior prior{graph.size_prior.log_mean[object], graph.size_prior.log_sigma[object]};
-  const bool unconstrained = options.landmark_model == LandmarkModel::kDualQuadric;
-  switch (options.start) {
+  const bool unconstrained = context.options.landmark_model == LandmarkModel::kDualQuadric;
+  switch (context.options.start) {
     case Start::kIdentity:
       return unconstrained ? IdentityQuadric() : Sphere(Eigen::Vector3d::Zero(), 1);
     case Start::kSizePrior:
-      return InModel(BackProject(graph.camera, views, prior), options.landmark_model);
+      return InModel(BackProject(graph.camera, views, prior), context.options.landmark_model);
     case Start::kSvd:
       if (views.size() >= 3) {
         const SvdFit fit = FitSvd(graph.camera, views);
@@ -73,41 +73,40 @@ Vector9d StartObject(const PreparedGraph& prepared,
     case Start::kSphere:
       break;
   }
-  return InModel(FitSphere(graph.camera, views, prior), options.landmark_model);
+  return InModel(FitSphere(graph.camera, views, prior), context.options.landmark_model);
 }
 
-Summary Grow(const PreparedGraph& prepared,
-             const SolveOptions& options,
-             const Monitor& monitor,
-             State* state) {
-  const Graph& graph = prepared.graph;
+Summary Grow(const SolveContext& context, State* state) {
+  const Graph& graph = context.graph();
   std::vector<bool> started(graph.num_objects(), false);
   Summary total;
   for (int begin = 0, end = 0; begin < graph.num_poses(); begin = end) {
-    end = EndOfAddition(prepared, options, begin);
+    end = EndOfAddition(context, begin);
     Stage stage;
     stage.end_pose = end;
     const bool last = end == graph.num_poses();
-    DeadReckon(prepared, begin, end, state);
+    DeadReckon(context.prepared, begin, end, state);
     for (int object = 0; object < graph.num_objects(); ++object) {
-      const std::vector<int>& rows = prepared.boxes_of_object[object];
+      const std::vector<int>& rows = context.prepared.boxes_of_object[object];
       const auto behind = std::partition_point(
           rows.begin(), rows.end(), [&](int row) { return graph.boxes.pose[row] < end; });
       const std::vector<int> seen(rows.begin(), behind);
-      if (!started[object] && (last || static_cast<int>(seen.size()) >= options.grow_min_views)) {
-        state->landmarks.row(object) = StartObject(prepared, options, *state, object, seen);
+      if (!started[object] &&
+          (last || static_cast<int>(seen.size()) >= context.options.grow_min_views)) {
+        state->landmarks.row(object) = StartObject(context, *state, object, seen);
         started[object] = true;
       }
       if (started[object]) stage.boxes.insert(stage.boxes.end(), seen.begin(), seen.end());
     }
     if (stage.boxes.empty()) continue;
-    stage.residual =
-        options.residual == Residual::kTangentThenBox ? Residual::kTangent : options.residual;
-    stage.loss = IsRobust(options.loss) ? Loss::kCauchy : Loss::kNone;
+    stage.residual = context.options.residual == Residual::kTangentThenBox
+                         ? Residual::kTangent
+                         : context.options.residual;
+    stage.loss = IsRobust(context.options.loss) ? Loss::kCauchy : Loss::kNone;
     stage.minimizer = Minimizer::kLevenbergMarquardt;
-    stage.max_iterations = options.grow_iterations;
-    stage.function_tolerance = options.grow_tolerance;
-    Append(Optimize(prepared, options, stage, monitor, state), &total);
+    stage.max_iterations = context.options.grow_iterations;
+    stage.function_tolerance = context.options.grow_tolerance;
+    Append(Optimize(context, stage, state), &total);
   }
   return total;
 }

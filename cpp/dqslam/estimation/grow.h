@@ -14,16 +14,12 @@ std::vector<View> ViewsOf(const PreparedGraph& prepared,
                           const std::vector<int>& boxes);
 
 /// Landmark parameters of an object from some of its boxes, by the method options.start.
-Vector9d StartObject(const PreparedGraph& prepared,
-                     const SolveOptions& options,
+Vector9d StartObject(const SolveContext& context,
                      const State& state,
                      int object,
                      const std::vector<int>& boxes);
 
 /// Estimates poses and landmarks from the odometry on.  At the end every object has been started.
-Summary Grow(const PreparedGraph& prepared,
-             const SolveOptions& options,
-             const Monitor& monitor,
-             State* state);
+Summary Grow(const SolveContext& context, State* state);
 
 }  // namespace dqslam

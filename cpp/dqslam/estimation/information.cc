@@ -28,12 +28,10 @@ void CheckState(const Graph& graph, const State& state) {
   }
 }
 
-Stage StageOfInliers(const PreparedGraph& prepared,
-                     const SolveOptions& options,
-                     const State& state) {
-  Stage stage = BatchStage(prepared, options);
-  if (IsRobust(options.loss)) {
-    const std::vector<bool> inliers = InlierBoxes(prepared, options, state);
+Stage StageOfInliers(const SolveContext& context, const State& state) {
+  Stage stage = BatchStage(context);
+  if (IsRobust(context.options.loss)) {
+    const std::vector<bool> inliers = InlierBoxes(context, state);
     stage.weights.assign(inliers.begin(), inliers.end());
     stage.loss = Loss::kNone;
   }
@@ -44,11 +42,8 @@ Stage StageOfInliers(const PreparedGraph& prepared,
 template <typename Pose, typename Landmark>
 class JacobianRows {
  public:
-  JacobianRows(const PreparedGraph& prepared,
-               const SolveOptions& options,
-               const VariableIndex& variables,
-               const State& state)
-      : prepared_(prepared), options_(options), variables_(variables), state_(state) {}
+  JacobianRows(const SolveContext& context, const VariableIndex& variables, const State& state)
+      : context_(context), variables_(variables), state_(state) {}
 
   template <typename Cost, typename... Rows>
   bool Visit(const Cost& cost, const Rows&... rows) {
@@ -60,13 +55,13 @@ class JacobianRows {
   }
 
   bool VisitBox(const StageBox& box) {
-    const PoseRow pose{prepared_.graph.boxes.pose[box.row]};
-    const ObjectRow object{prepared_.graph.boxes.object[box.row]};
+    const PoseRow pose{context_.graph().boxes.pose[box.row]};
+    const ObjectRow object{context_.graph().boxes.object[box.row]};
     if constexpr (Landmark::kModel == LandmarkModel::kEllipsoid) {
       if (!IsAlgebraic(box.residual.residual)) return VisitEdges(box, pose, object);
     }
     return VisitBoxCost<Pose, Landmark>(
-        prepared_, options_, box, [&](const auto& cost) { return Visit(cost, pose, object); });
+        context_, box, [&](const auto& cost) { return Visit(cost, pose, object); });
   }
 
   void MoveTo(Information* information) {
@@ -95,10 +90,10 @@ class JacobianRows {
     Matrix<kBoxSize, 1> residual;
     Matrix<kBoxSize, Pose::kTangentSize> by_pose;
     Matrix<kBoxSize, kLandmarkSize> by_object;
-    const Station station = Station::At<Pose>(ValuesOf(pose), prepared_.mount);
+    const Station station = Station::At<Pose>(ValuesOf(pose), context_.prepared.mount);
     const Unpacked<EllipsoidModel> ellipsoid(ValuesOf(object));
     if (!LinearizeBox<Pose, true>(
-            prepared_, box, station, ellipsoid, &residual, &by_pose, &by_object)) {
+            context_.prepared, box, station, ellipsoid, &residual, &by_pose, &by_object)) {
       return false;
     }
     Matrix<kBoxSize, Pose::kTangentSize + kLandmarkSize> jacobian;
@@ -135,8 +130,7 @@ class JacobianRows {
     }
   }
 
-  const PreparedGraph& prepared_;
-  const SolveOptions& options_;
+  const SolveContext& context_;
   const VariableIndex& variables_;
   const State& state_;
   std::vector<double> residuals_, values_;
@@ -159,8 +153,9 @@ Information ComputeInformation(const Graph& graph,
                                const State& state) {
   const PreparedGraph prepared(graph, options.mode == Mode::kMapping);
   CheckState(graph, state);
-  const StageTerms terms =
-      SelectTerms(prepared, options, StageOfInliers(prepared, options, state), state);
+  const Monitor no_monitor;
+  const SolveContext context{prepared, options, no_monitor};
+  const StageTerms terms = SelectTerms(context, StageOfInliers(context, state), state);
 
   Information information;
   information.first_free_pose = terms.variables.first_free_pose;
@@ -169,8 +164,7 @@ Information ComputeInformation(const Graph& graph,
   information.block_sizes = terms.variables.BlockSizes();
   const bool defined =
       Dispatch(graph.pose_model, options.landmark_model, [&](auto pose, auto landmark) {
-        JacobianRows<decltype(pose), decltype(landmark)> rows(
-            prepared, options, terms.variables, state);
+        JacobianRows<decltype(pose), decltype(landmark)> rows(context, terms.variables, state);
         if (!VisitTerms<decltype(pose), decltype(landmark)>(prepared, terms, &rows)) return false;
         rows.MoveTo(&information);
         return true;

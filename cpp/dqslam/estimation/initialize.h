@@ -17,15 +17,6 @@ struct View {
   EdgeFlags truncated = EdgeFlags::Constant(false);
 };
 
-<<<<<<< HEAD
-=======
-/// Prior on the logarithm of the object's semi-axes, in log meters.
-struct SizePrior {
-  double log_mean = 0;
-  double log_sigma = 1;
-};
-
->>>>>>> prose
 /// The paper's linear fit.  [S&M17] eqs. (9), (10)
 struct SvdFit {
   Vector9d quadric;                              ///< of any signature

@@ -29,33 +29,28 @@ bool KeepIfBetter(const State& attempt, const Summary& total, State* state, Summ
 
 // Whether the prior excludes an object's size.  Such an object may be at a wrong depth, where a
 // very thin ellipsoid fits the boxes.
-bool HasImpossibleSize(const PreparedGraph& prepared,
-                       const SolveOptions& options,
-                       const State& state,
-                       int object) {
-  if (options.landmark_model != LandmarkModel::kEllipsoid) return false;
-  const SizePriorTable& prior = prepared.graph.size_prior;
+bool HasImpossibleSize(const SolveContext& context, const State& state, int object) {
+  if (context.options.landmark_model != LandmarkModel::kEllipsoid) return false;
+  const SizePriorTable& prior = context.graph().size_prior;
   const Eigen::Array3d semi_axes = AxesFromEllipsoid(state.landmarks.row(object)).semi_axes;
   const Eigen::Array3d error = semi_axes.log() - prior.log_mean[object];
   return error.square().sum() > kImpossibleSize * std::pow(prior.log_sigma[object], 2);
 }
 
 // The stage of one object by itself: all its boxes, with constant poses.
-Stage StageOfObject(const PreparedGraph& prepared, const SolveOptions& options, int object) {
-  Stage stage = BatchStage(prepared, options);
-  stage.boxes = prepared.boxes_of_object[object];
-  stage.end_pose = stage.first_free_pose = prepared.graph.boxes.pose[stage.boxes.back()] + 1;
+Stage StageOfObject(const SolveContext& context, int object) {
+  Stage stage = BatchStage(context);
+  stage.boxes = context.prepared.boxes_of_object[object];
+  stage.end_pose = stage.first_free_pose = context.graph().boxes.pose[stage.boxes.back()] + 1;
   return stage;
 }
 
 }  // namespace
 
-std::vector<bool> StuckObjects(const PreparedGraph& prepared,
-                               const SolveOptions& options,
-                               const State& state) {
-  const Eigen::VectorXd costs = BoxCosts(prepared, options, state);
+std::vector<bool> StuckObjects(const SolveContext& context, const State& state) {
+  const Eigen::VectorXd costs = BoxCosts(context, state);
   std::vector<bool> stuck;
-  for (const std::vector<int>& rows : prepared.boxes_of_object) {
+  for (const std::vector<int>& rows : context.prepared.boxes_of_object) {
     std::vector<double> chi_squares;
     for (const int row : rows) chi_squares.push_back(2 * costs[row]);
     const auto middle = chi_squares.begin() + chi_squares.size() / 2;
@@ -84,79 +79,72 @@ bool IsTorn(const PreparedGraph& prepared, const State& state) {
   return chi_square > kTorn * odometry.size() * prepared.graph.tangent_size();
 }
 
-Stage BatchStage(const PreparedGraph& prepared, const SolveOptions& options) {
+Stage BatchStage(const SolveContext& context) {
   Stage stage;
-  stage.first_free_pose = options.mode == Mode::kMapping ? prepared.graph.num_poses() : 1;
-  stage.end_pose = prepared.graph.num_poses();
-  stage.boxes.resize(prepared.graph.boxes.size());
+  stage.first_free_pose = context.options.mode == Mode::kMapping ? context.graph().num_poses() : 1;
+  stage.end_pose = context.graph().num_poses();
+  stage.boxes.resize(context.graph().boxes.size());
   std::iota(stage.boxes.begin(), stage.boxes.end(), 0);
-  stage.residual =
-      options.residual == Residual::kTangentThenBox ? Residual::kBox : options.residual;
-  stage.loss = options.loss;
-  stage.minimizer = options.minimizer;
-  stage.max_iterations = options.max_iterations;
-  stage.function_tolerance = options.function_tolerance;
+  stage.residual = context.options.residual == Residual::kTangentThenBox ? Residual::kBox
+                                                                         : context.options.residual;
+  stage.loss = context.options.loss;
+  stage.minimizer = context.options.minimizer;
+  stage.max_iterations = context.options.max_iterations;
+  stage.function_tolerance = context.options.function_tolerance;
   return stage;
 }
 
-void RestartStuckObjects(const PreparedGraph& prepared,
-                         const SolveOptions& options,
-                         const Monitor& monitor,
-                         State* state,
-                         Summary* summary) {
-  const Stage all = BatchStage(prepared, options);
+void RestartStuckObjects(const SolveContext& context, State* state, Summary* summary) {
+  const Stage all = BatchStage(context);
   for (int restart = 0; restart < kMaxRestarts; ++restart) {
-    const std::vector<bool> stuck = StuckObjects(prepared, options, *state);
+    const std::vector<bool> stuck = StuckObjects(context, *state);
     if (std::none_of(stuck.begin(), stuck.end(), [](bool is_stuck) { return is_stuck; })) return;
 
     State attempt = *state;
     Stage rest = all;
     rest.boxes.clear();
     for (const int row : all.boxes) {
-      if (!stuck[prepared.graph.boxes.object[row]]) rest.boxes.push_back(row);
+      if (!stuck[context.graph().boxes.object[row]]) rest.boxes.push_back(row);
     }
     Summary total = *summary;
-    Append(Optimize(prepared, options, rest, monitor, &attempt), &total);
-    for (int object = 0; object < prepared.graph.num_objects(); ++object) {
+    Append(Optimize(context, rest, &attempt), &total);
+    for (int object = 0; object < context.graph().num_objects(); ++object) {
       if (!stuck[object]) continue;
       attempt.landmarks.row(object) =
-          StartObject(prepared, options, attempt, object, prepared.boxes_of_object[object]);
+          StartObject(context, attempt, object, context.prepared.boxes_of_object[object]);
     }
     Stage towards = all;
     towards.residual = Residual::kTangent;
     towards.minimizer = Minimizer::kLevenbergMarquardt;
-    Append(Optimize(prepared, options, towards, monitor, &attempt), &total);
-    Append(Optimize(prepared, options, all, monitor, &attempt), &total);
+    Append(Optimize(context, towards, &attempt), &total);
+    Append(Optimize(context, all, &attempt), &total);
     if (!KeepIfBetter(attempt, total, state, summary)) return;
   }
 }
 
-void TryOtherDepths(const PreparedGraph& prepared,
-                    const SolveOptions& options,
-                    const Monitor& monitor,
-                    State* state,
-                    Summary* summary) {
-  SolveOptions by_size = options;
-  by_size.start = Start::kSizePrior;
+void TryOtherDepths(const SolveContext& context, State* state, Summary* summary) {
+  SolveOptions options = context.options;
+  options.start = Start::kSizePrior;
+  const SolveContext by_size{context.prepared, options, context.monitor};
   State attempt = *state;
   Summary total = *summary;
   bool any = false;
-  for (int object = 0; object < prepared.graph.num_objects(); ++object) {
-    const std::vector<int>& boxes = prepared.boxes_of_object[object];
+  for (int object = 0; object < context.graph().num_objects(); ++object) {
+    const std::vector<int>& boxes = context.prepared.boxes_of_object[object];
     const bool is_few = static_cast<int>(boxes.size()) <= kFewBoxes;
-    if (!is_few && !HasImpossibleSize(prepared, options, *state, object)) continue;
-    const Stage alone = StageOfObject(prepared, options, object);
+    if (!is_few && !HasImpossibleSize(context, *state, object)) continue;
+    const Stage alone = StageOfObject(context, object);
     State moved = attempt;
-    moved.landmarks.row(object) = StartObject(prepared, by_size, moved, object, boxes);
-    const Summary there = Optimize(prepared, options, alone, monitor, &moved);
+    moved.landmarks.row(object) = StartObject(by_size, moved, object, boxes);
+    const Summary there = Optimize(context, alone, &moved);
     State stayed = attempt;
-    const Summary here = Optimize(prepared, options, alone, monitor, &stayed);
+    const Summary here = Optimize(context, alone, &stayed);
     if (!(there.final_cost < here.final_cost)) continue;
     attempt.landmarks.row(object) = moved.landmarks.row(object);
     any = true;
   }
   if (!any) return;
-  Append(Optimize(prepared, options, BatchStage(prepared, options), monitor, &attempt), &total);
+  Append(Optimize(context, BatchStage(context), &attempt), &total);
   KeepIfBetter(attempt, total, state, summary);
 }
 

@@ -44,12 +44,15 @@ void ValidateStart(const Graph& graph, const State& start) {
 
 class Solver {
  public:
-  Solver(const PreparedGraph& prepared, const SolveOptions& options, const Monitor& monitor)
-      : graph_(prepared.graph), options_(options), monitor_(monitor), prepared_(prepared) {}
+  explicit Solver(const SolveContext& context)
+      : context_(context),
+        prepared_(context.prepared),
+        graph_(context.graph()),
+        options_(context.options) {}
 
   /// Whether objects remain that are impossible given their boxes.
   bool LeavesObjectsStuck(const State& state) const {
-    const std::vector<bool> stuck = StuckObjects(prepared_, options_, state);
+    const std::vector<bool> stuck = StuckObjects(context_, state);
     return std::any_of(stuck.begin(), stuck.end(), [](bool is_stuck) { return is_stuck; });
   }
 
@@ -67,7 +70,7 @@ class Solver {
   }
 
   Mask Inliers(const State& state) const {
-    const std::vector<bool> inliers = InlierBoxes(prepared_, options_, state);
+    const std::vector<bool> inliers = InlierBoxes(context_, state);
     Mask mask(inliers.size());
     std::copy(inliers.begin(), inliers.end(), mask.begin());
     return mask;
@@ -86,17 +89,17 @@ class Solver {
       summary.start_seconds = elapsed.count();
     }
     if (ThrowsBoxesOut(options_.loss)) {
-      Append(Batch(BatchStage(prepared_, options_).residual, Loss::kCauchy, state), &summary);
+      Append(Batch(BatchStage(context_).residual, Loss::kCauchy, state), &summary);
     }
     if (options_.loss == Loss::kGncTls || options_.loss == Loss::kGncGm) {
-      Append(GraduateNonConvexity(prepared_, options_, monitor_, state), &summary);
+      Append(GraduateNonConvexity(context_, state), &summary);
       return summary;
     }
     if (options_.loss == Loss::kSwitchable) SetSwitches(state);
-    Append(Batch(BatchStage(prepared_, options_).residual, options_.loss, state), &summary);
+    Append(Batch(BatchStage(context_).residual, options_.loss, state), &summary);
     if (Refines()) {
-      RestartStuckObjects(prepared_, options_, monitor_, state, &summary);
-      TryOtherDepths(prepared_, options_, monitor_, state, &summary);
+      RestartStuckObjects(context_, state, &summary);
+      TryOtherDepths(context_, state, &summary);
     }
     return summary;
   }
@@ -108,7 +111,7 @@ class Solver {
     state->poses = graph_.initial_poses;
     state->landmarks = RowMatrix::Zero(graph_.num_objects(), kLandmarkSize);
     if (options_.schedule == Schedule::kGrow && options_.mode == Mode::kSlam) {
-      return Grow(prepared_, options_, monitor_, state);
+      return Grow(context_, state);
     }
     StartAll(state);
     const Loss loss = IsRobust(options_.loss) ? Loss::kCauchy : Loss::kNone;
@@ -119,42 +122,40 @@ class Solver {
   // first steps would leave the solution that the Cauchy loss has reached.
   void SetSwitches(State* state) const {
     const double phi = options_.outlier_chi_square;
-    state->switches = phi / (phi + 2 * BoxCosts(prepared_, options_, *state).array());
+    state->switches = phi / (phi + 2 * BoxCosts(context_, *state).array());
   }
 
   void StartAll(State* state) {
     for (int object = 0; object < graph_.num_objects(); ++object) {
       state->landmarks.row(object) =
-          StartObject(prepared_, options_, *state, object, prepared_.boxes_of_object[object]);
+          StartObject(context_, *state, object, prepared_.boxes_of_object[object]);
     }
   }
 
   Summary Batch(Residual residual, Loss loss, State* state) {
-    Stage stage = BatchStage(prepared_, options_);
+    Stage stage = BatchStage(context_);
     stage.residual = residual;
     stage.loss = loss;
-    const bool all_defined =
-        residual != Residual::kBox || BoxCosts(prepared_, options_, *state).allFinite();
-    Summary summary = Optimize(prepared_, options_, stage, monitor_, state);
+    const bool all_defined = residual != Residual::kBox || BoxCosts(context_, *state).allFinite();
+    Summary summary = Optimize(context_, stage, state);
     // Boxes that were undefined at the start of the stage have used the tangent residual so far.
-    if (!all_defined) Append(Optimize(prepared_, options_, stage, monitor_, state), &summary);
+    if (!all_defined) Append(Optimize(context_, stage, state), &summary);
     return summary;
   }
 
+  const SolveContext context_;
+  const PreparedGraph& prepared_;
   const Graph& graph_;
   const SolveOptions& options_;
-  const Monitor& monitor_;
-  const PreparedGraph& prepared_;
 };
 
 // Grows again in smaller steps, up to two times, if objects are stuck, the path is torn or the last
 // stage did not converge.  Keeps the result with the lowest cost.  With a robust loss, all boxes of
 // an object may be outliers, so these tests do not apply: it grows once, in smaller steps.
-Summary SolveInAttempts(const PreparedGraph& prepared,
-                        const SolveOptions& options,
+Summary SolveInAttempts(const SolveContext& context,
                         const std::optional<State>& start,
-                        const Monitor& monitor,
                         State* state) {
+  const SolveOptions& options = context.options;
   const bool repeats = !start && options.mode == Mode::kSlam && options.loss == Loss::kNone &&
                        options.schedule == Schedule::kGrow &&
                        options.residual == Residual::kTangentThenBox;
@@ -164,7 +165,7 @@ Summary SolveInAttempts(const PreparedGraph& prepared,
     const int halvings = 2 * (IsRobust(options.loss) ? 1 : attempt);
     variant.grow_poses = std::max(options.grow_poses >> halvings, 1);
     variant.grow_rotation = options.grow_rotation / (1 << halvings);
-    Solver solver(prepared, variant, monitor);
+    Solver solver({context.prepared, variant, context.monitor});
     State reached;
     const Summary summary = solver.Run(start, &reached);
     if (attempt == 0 || summary.final_cost < best.final_cost) {
@@ -190,8 +191,9 @@ Solution Solve(const Graph& graph,
   const PreparedGraph prepared(graph, options.mode == Mode::kMapping);
   State state;
   Solution solution;
-  solution.summary = SolveInAttempts(prepared, options, start, monitor, &state);
-  const Solver solver(prepared, options, monitor);
+  const SolveContext context{prepared, options, monitor};
+  solution.summary = SolveInAttempts(context, start, &state);
+  const Solver solver(context);
   solution.svd_singular_values = options.start == Start::kSvd
                                      ? solver.SvdSingularValues()
                                      : RowMatrix::Constant(graph.num_objects(), 10, std::nan(""));

@@ -18,12 +18,8 @@ namespace {
 template <typename Pose, typename Landmark>
 class ResidualBlocks {
  public:
-  ResidualBlocks(const PreparedGraph& prepared,
-                 const SolveOptions& options,
-                 Loss loss,
-                 State* state,
-                 ceres::Problem* problem)
-      : prepared_(prepared), options_(options), loss_(loss), state_(*state), problem_(*problem) {}
+  ResidualBlocks(const SolveContext& context, Loss loss, State* state, ceres::Problem* problem)
+      : context_(context), loss_(loss), state_(*state), problem_(*problem) {}
 
   void AddVariables(const VariableIndex& variables) {
     auto* manifold = new PoseManifold<Pose>;  // owned by the problem, shared by all poses
@@ -49,13 +45,13 @@ class ResidualBlocks {
   }
 
   bool VisitBox(const StageBox& box) {
-    const BoxTable& boxes = prepared_.graph.boxes;
+    const BoxTable& boxes = context_.graph().boxes;
     double* pose = ParametersOf(PoseRow{boxes.pose[box.row]});
     double* object = ParametersOf(ObjectRow{boxes.object[box.row]});
-    return VisitBoxCost<Pose, Landmark>(prepared_, options_, box, [&](const auto& cost) {
+    return VisitBoxCost<Pose, Landmark>(context_, box, [&](const auto& cost) {
       using Cost = std::decay_t<decltype(cost)>;
       if (loss_ == Loss::kSwitchable) {
-        const double sqrt_phi = std::sqrt(options_.outlier_chi_square);
+        const double sqrt_phi = std::sqrt(context_.options.outlier_chi_square);
         problem_.AddResidualBlock(SwitchedCost<Pose, Cost>::Create(cost, sqrt_phi),
                                   nullptr,
                                   pose,
@@ -63,7 +59,7 @@ class ResidualBlocks {
                                   &state_.switches[box.row]);
         return true;
       }
-      ceres::LossFunction* loss = MakeLoss(loss_, options_).release();
+      ceres::LossFunction* loss = MakeLoss(loss_, context_.options).release();
       if (box.weight != 1) loss = new ceres::ScaledLoss(loss, box.weight, ceres::TAKE_OWNERSHIP);
       problem_.AddResidualBlock(Cost::CreateFrom(cost), loss, pose, object);
       return true;
@@ -74,8 +70,7 @@ class ResidualBlocks {
   double* ParametersOf(PoseRow pose) { return state_.poses.row(pose.row).data(); }
   double* ParametersOf(ObjectRow object) { return state_.landmarks.row(object.row).data(); }
 
-  const PreparedGraph& prepared_;
-  const SolveOptions& options_;
+  const SolveContext& context_;
   Loss loss_;
   State& state_;
   ceres::Problem& problem_;
@@ -83,19 +78,19 @@ class ResidualBlocks {
 
 }  // namespace
 
-void MakeCeresProblem(const PreparedGraph& prepared,
-                      const SolveOptions& options,
+void MakeCeresProblem(const SolveContext& context,
                       const Stage& stage,
                       State* state,
                       ceres::Problem* problem) {
-  const StageTerms terms = SelectTerms(prepared, options, stage, *state);
-  Dispatch(prepared.graph.pose_model, options.landmark_model, [&](auto pose, auto landmark) {
-    using Pose = decltype(pose);
-    using Landmark = decltype(landmark);
-    ResidualBlocks<Pose, Landmark> blocks(prepared, options, stage.loss, state, problem);
-    blocks.AddVariables(terms.variables);
-    VisitTerms<Pose, Landmark>(prepared, terms, &blocks);
-  });
+  const StageTerms terms = SelectTerms(context, stage, *state);
+  Dispatch(
+      context.graph().pose_model, context.options.landmark_model, [&](auto pose, auto landmark) {
+        using Pose = decltype(pose);
+        using Landmark = decltype(landmark);
+        ResidualBlocks<Pose, Landmark> blocks(context, stage.loss, state, problem);
+        blocks.AddVariables(terms.variables);
+        VisitTerms<Pose, Landmark>(context.prepared, terms, &blocks);
+      });
 }
 
 }  // namespace dqslam

@@ -11,8 +11,7 @@ namespace dqslam {
 
 /// Adds all terms of the stage, with their poses and objects, to the problem.  The problem points
 /// into `state`, which must outlive it.
-void MakeCeresProblem(const PreparedGraph& prepared,
-                      const SolveOptions& options,
+void MakeCeresProblem(const SolveContext& context,
                       const Stage& stage,
                       State* state,
                       ceres::Problem* problem);

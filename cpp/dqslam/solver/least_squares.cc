@@ -123,16 +123,17 @@ class StageProblem : public LeastSquares {
 
 }  // namespace
 
-std::unique_ptr<LeastSquares> MakeLeastSquares(const PreparedGraph& prepared,
-                                               const SolveOptions& options,
+std::unique_ptr<LeastSquares> MakeLeastSquares(const SolveContext& context,
                                                const Stage& stage,
                                                const State& state) {
-  StageTerms terms = SelectTerms(prepared, options, stage, state);
-  return Dispatch(prepared.graph.pose_model, [&](auto pose) -> std::unique_ptr<LeastSquares> {
+  StageTerms terms = SelectTerms(context, stage, state);
+  return Dispatch(context.graph().pose_model, [&](auto pose) -> std::unique_ptr<LeastSquares> {
     using Pose = decltype(pose);
-    Pattern pattern = MakePattern<Pose>(prepared, terms);
-    return std::make_unique<StageProblem<Pose>>(
-        prepared, MakeLoss(stage.loss, options), std::move(terms), std::move(pattern));
+    Pattern pattern = MakePattern<Pose>(context.prepared, terms);
+    return std::make_unique<StageProblem<Pose>>(context.prepared,
+                                                MakeLoss(stage.loss, context.options),
+                                                std::move(terms),
+                                                std::move(pattern));
   });
 }
 

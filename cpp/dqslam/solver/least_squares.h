@@ -42,8 +42,7 @@ class LeastSquares {
 
 /// Makes the problem of a stage.  A box whose box residual is undefined at `state` gets the tangent
 /// residual instead.  `prepared` must outlive the result.
-std::unique_ptr<LeastSquares> MakeLeastSquares(const PreparedGraph& prepared,
-                                               const SolveOptions& options,
+std::unique_ptr<LeastSquares> MakeLeastSquares(const SolveContext& context,
                                                const Stage& stage,
                                                const State& state);
 

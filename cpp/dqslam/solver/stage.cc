@@ -21,21 +21,17 @@ bool NeedsCeres(const SolveOptions& options, const Stage& stage) {
 
 }  // namespace
 
-Summary Optimize(const PreparedGraph& prepared,
-                 const SolveOptions& options,
-                 const Stage& stage,
-                 const Monitor& monitor,
-                 State* state) {
+Summary Optimize(const SolveContext& context, const Stage& stage, State* state) {
   const TrustRegionOptions method{stage.minimizer, stage.max_iterations, stage.function_tolerance};
   Summary summary;
-  if (NeedsCeres(options, stage)) {
+  if (NeedsCeres(context.options, stage)) {
     ceres::Problem problem;
-    MakeCeresProblem(prepared, options, stage, state, &problem);
-    summary = MinimizeByCeres(method, monitor, &problem);
+    MakeCeresProblem(context, stage, state, &problem);
+    summary = MinimizeByCeres(method, context.monitor, &problem);
   } else {
-    const auto problem = MakeLeastSquares(prepared, options, stage, *state);
+    const auto problem = MakeLeastSquares(context, stage, *state);
     Eigen::VectorXd values = problem->Pack(*state);
-    summary = Minimize(method, monitor, problem.get(), &values);
+    summary = Minimize(method, context.monitor, problem.get(), &values);
     problem->Unpack(values, state);
   }
   if (summary.rejected_steps > 0 && summary.rejected_steps == summary.iterations) {
@@ -45,12 +41,10 @@ Summary Optimize(const PreparedGraph& prepared,
   return summary;
 }
 
-Eigen::VectorXd BoxCosts(const PreparedGraph& prepared,
-                         const SolveOptions& options,
-                         const State& state) {
-  const Graph& graph = prepared.graph;
+Eigen::VectorXd BoxCosts(const SolveContext& context, const State& state) {
+  const Graph& graph = context.graph();
   Eigen::VectorXd costs(graph.boxes.size());
-  Dispatch(graph.pose_model, options.landmark_model, [&](auto pose_model, auto landmark) {
+  Dispatch(graph.pose_model, context.options.landmark_model, [&](auto pose_model, auto landmark) {
     using Pose = decltype(pose_model);
     using Landmark = decltype(landmark);
     for (int row = 0; row < graph.boxes.size(); ++row) {
@@ -58,12 +52,13 @@ Eigen::VectorXd BoxCosts(const PreparedGraph& prepared,
       const double* parameters = state.landmarks.row(graph.boxes.object[row]).data();
       Eigen::Vector4d predicted;
       const Surface<double> surface =
-          ToCamera(LocateCamera<Pose>(pose, prepared.mount), Landmark::Unpack(parameters));
+          ToCamera(LocateCamera<Pose>(pose, context.prepared.mount), Landmark::Unpack(parameters));
       const bool defined = ProjectToBox(surface, graph.camera, &predicted);
       Eigen::Vector4d error = predicted - graph.boxes.box.row(row).transpose();
-      IgnoreBeyond(OneSidedEdges(prepared, row, surface), &error);
-      costs[row] = defined ? 0.5 * (prepared.box_sqrt_information[row] * error).squaredNorm()
-                           : std::numeric_limits<double>::infinity();
+      IgnoreBeyond(OneSidedEdges(context.prepared, row, surface), &error);
+      costs[row] = defined
+                       ? 0.5 * (context.prepared.box_sqrt_information[row] * error).squaredNorm()
+                       : std::numeric_limits<double>::infinity();
     }
   });
   return costs;

@@ -13,6 +13,15 @@ inline bool IsAlgebraic(Residual residual) {
   return residual == Residual::kAlgebraic || residual == Residual::kAlgebraicNormalized;
 }
 
+/// What all stages of a solve share.  The members must outlive the context.
+struct SolveContext {
+  const PreparedGraph& prepared;
+  const SolveOptions& options;
+  const Monitor& monitor;
+
+  const Graph& graph() const { return prepared.graph; }
+};
+
 /// The part of the graph that a stage uses, and how it is minimized.
 struct Stage {
   int first_free_pose = 1;                 ///< poses before it are constant
@@ -30,16 +39,10 @@ struct Stage {
 /// residuals of ellipsoids.  Ceres minimizes stages with algebraic residuals, dual quadrics or
 /// switchable constraints, and every stage with Backend::kCeres.  A box whose box residual is
 /// undefined at the start of the stage uses the tangent residual.  Throws Interrupted.
-Summary Optimize(const PreparedGraph& prepared,
-                 const SolveOptions& options,
-                 const Stage& stage,
-                 const Monitor& monitor,
-                 State* state);
+Summary Optimize(const SolveContext& context, const Stage& stage, State* state);
 
 /// Half the squared Mahalanobis distance of each box from its prediction.  It is infinite where the
 /// object is not strictly in front of the camera.
-Eigen::VectorXd BoxCosts(const PreparedGraph& prepared,
-                         const SolveOptions& options,
-                         const State& state);
+Eigen::VectorXd BoxCosts(const SolveContext& context, const State& state);
 
 }  // namespace dqslam

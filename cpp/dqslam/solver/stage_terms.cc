@@ -30,19 +30,19 @@ Surface<double> UnpackAny(LandmarkModel model, const double* parameters) {
                                             : DualQuadricModel::Unpack(parameters);
 }
 
-BoxResidual ChooseResidual(const PreparedGraph& prepared,
-                           const SolveOptions& options,
+BoxResidual ChooseResidual(const SolveContext& context,
                            const Stage& stage,
                            const State& state,
                            int row) {
   BoxResidual chosen;
   chosen.residual = stage.residual;
   if (IsAlgebraic(stage.residual)) return chosen;
-  const Graph& graph = prepared.graph;
-  const Surface<double> surface = ToCamera(
-      LocateCamera(prepared, state, graph.boxes.pose[row]),
-      UnpackAny(options.landmark_model, state.landmarks.row(graph.boxes.object[row]).data()));
-  chosen.one_sided = OneSidedEdges(prepared, row, surface);
+  const Graph& graph = context.graph();
+  const Surface<double> surface =
+      ToCamera(LocateCamera(context.prepared, state, graph.boxes.pose[row]),
+               UnpackAny(context.options.landmark_model,
+                         state.landmarks.row(graph.boxes.object[row]).data()));
+  chosen.one_sided = OneSidedEdges(context.prepared, row, surface);
   Eigen::Vector4d predicted;
   if (stage.residual == Residual::kBox && ProjectToBox(surface, graph.camera, &predicted)) {
     return chosen;
@@ -54,11 +54,8 @@ BoxResidual ChooseResidual(const PreparedGraph& prepared,
 
 }  // namespace
 
-StageTerms SelectTerms(const PreparedGraph& prepared,
-                       const SolveOptions& options,
-                       const Stage& stage,
-                       const State& state) {
-  const Graph& graph = prepared.graph;
+StageTerms SelectTerms(const SolveContext& context, const Stage& stage, const State& state) {
+  const Graph& graph = context.graph();
   StageTerms terms{IndexVariables(graph, stage), {}, {}, {}};
   VariableIndex& variables = terms.variables;
   for (int row = 0; row < graph.odometry.size(); ++row) {
@@ -72,7 +69,7 @@ StageTerms SelectTerms(const PreparedGraph& prepared,
     const int row = stage.boxes[i];
     const double weight = stage.weights.empty() ? 1.0 : stage.weights[i];
     if (weight == 0) continue;
-    terms.boxes.push_back({row, weight, ChooseResidual(prepared, options, stage, state, row)});
+    terms.boxes.push_back({row, weight, ChooseResidual(context, stage, state, row)});
   }
   for (const MeasurementTable& table : graph.measurements) {
     std::vector<int>& rows = terms.measurements.emplace_back();

@@ -30,9 +30,6 @@ struct StageTerms {
 
 /// The terms of a stage, with their poses and objects.  A box whose residual is undefined at
 /// `state` gets the tangent residual instead.
-StageTerms SelectTerms(const PreparedGraph& prepared,
-                       const SolveOptions& options,
-                       const Stage& stage,
-                       const State& state);
+StageTerms SelectTerms(const SolveContext& context, const Stage& stage, const State& state);
 
 }  // namespace dqslam

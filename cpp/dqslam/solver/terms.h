@@ -33,21 +33,18 @@ ObjectParameters ParametersOf(ObjectRow, const double* values) {
 
 /// Calls visit(cost) with the cost of a box, and returns the result of the call.
 template <typename Pose, typename Landmark, typename Visit>
-auto VisitBoxCost(const PreparedGraph& prepared,
-                  const SolveOptions& options,
-                  const StageBox& box,
-                  Visit&& visit) {
-  const Camera& camera = prepared.graph.camera;
-  const Mount& mount = prepared.mount;
-  const Eigen::Vector4d observed = prepared.graph.boxes.box.row(box.row);
-  const Eigen::Matrix4d& sqrt_information = prepared.box_sqrt_information[box.row];
+auto VisitBoxCost(const SolveContext& context, const StageBox& box, Visit&& visit) {
+  const Camera& camera = context.graph().camera;
+  const Mount& mount = context.prepared.mount;
+  const Eigen::Vector4d observed = context.graph().boxes.box.row(box.row);
+  const Eigen::Matrix4d& sqrt_information = context.prepared.box_sqrt_information[box.row];
   const BoxResidual& role = box.residual;
   if (IsAlgebraic(role.residual)) {
     return visit(
         AlgebraicCost<Pose, Landmark>{{},
                                       mount,
                                       BoxLines(camera, observed),
-                                      Eigen::Matrix4d::Identity() / options.algebraic_sigma,
+                                      Eigen::Matrix4d::Identity() / context.options.algebraic_sigma,
                                       role.residual == Residual::kAlgebraicNormalized});
   }
   if (role.residual == Residual::kBox) {
