@@ -2,6 +2,7 @@
 # `--component library` names them where a tree has built no more than the library.
 
 include(CMakePackageConfigHelpers)
+include(GNUInstallDirs)
 
 set(dqslam_package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/dqslam)
 
