@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_associate_judge import circle
 
 import dqslam as dq
 from dqslam import Detections, Odometry, PoseModel, Recording, _core
@@ -13,6 +12,7 @@ from dqslam.association.association import _cut_alike
 from dqslam.assumptions import BoxNoise, OdometryNoise
 from dqslam.metrics import score_association
 from scenes import Film, Thing, film, orbit_poses, street_poses, switched_ids, table_things
+from test_association_consistency import circle
 
 NOISE = OdometryNoise(0.02, 0.01)
 BOXES = BoxNoise(1.0, 0.02)

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from benchmarks.problems import chain
-from test_associate_judge import circle
+from test_association_consistency import circle
 
 import dqslam as dq
 from dqslam.association.thinning import thin_recording
@@ -51,7 +51,7 @@ def followed(made: Film, recording=None, **options):
 
 def bits(slam):
     shown = np.concatenate(slam.assignments) if slam.assignments else np.zeros(0)
-    return slam.trajectory.tobytes(), slam.objects.ellipsoids.tobytes(), shown.tobytes()
+    return slam.poses.tobytes(), slam.objects.ellipsoids.tobytes(), shown.tobytes()
 
 
 def score(made: Film, slam: OnlineSlam):
@@ -66,7 +66,7 @@ def assert_found(made: Film, slam: OnlineSlam, *, recall):
     assert result.purity >= 0.98
     assert result.recall >= recall
     assert slam.left_out == {}
-    assert slam.count == len(slam.objects) == 8
+    assert slam.num_objects == len(slam.objects) == 8
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -76,10 +76,10 @@ def test_boxes_find_their_objects_as_they_arrive(seed):
     result = score(made, slam)
     assert result.found == 8
     assert result.purity >= 0.95
-    assert made.ate(slam.trajectory) < 0.5 * made.ate(made.odometry)
+    assert made.ate(slam.poses) < 0.5 * made.ate(made.odometry)
     slam.polish()
     assert_found(made, slam, recall=0.9)
-    assert made.ate(slam.trajectory) < 0.5 * made.ate(made.odometry)
+    assert made.ate(slam.poses) < 0.5 * made.ate(made.odometry)
     for center in slam.objects.centers:
         assert np.linalg.norm(made.centers - center, axis=1).min() < 0.08
 
@@ -102,7 +102,7 @@ def test_the_level_of_the_noise_is_estimated():
     slam.polish()
     assert slam.odometry_noise.translation_m == pytest.approx(0.02, rel=0.5)
     assert slam.odometry_noise.rotation_rad == pytest.approx(0.01, rel=0.5)
-    assert made.ate(slam.trajectory) < 0.5 * made.ate(made.odometry)
+    assert made.ate(slam.poses) < 0.5 * made.ate(made.odometry)
 
 
 def test_ids_that_switch_are_cut_and_joined():
@@ -130,11 +130,11 @@ def test_what_moves_is_left_out_and_said():
     for number, why in slam.left_out.items():
         assert "it moved" in why
         assert set(made.thing[shown == number].tolist()) == {7}
-        assert number not in slam.objects.ids
+        assert number not in slam.objects.object_ids
         assert slam.estimate().dropped[number] == why
-    mapped = made.thing[np.isin(shown, slam.objects.ids)]
+    mapped = made.thing[np.isin(shown, slam.objects.object_ids)]
     assert set(range(7)) <= set(mapped.tolist())
-    assert made.ate(slam.trajectory) < 0.5 * made.ate(made.odometry)
+    assert made.ate(slam.poses) < 0.5 * made.ate(made.odometry)
 
 
 def test_the_same_steps_give_the_same_bits():
@@ -208,7 +208,7 @@ def test_boxes_with_ids_and_without_are_objects_of_their_own():
     np.testing.assert_array_equal(shown[half >= 0], half[half >= 0])
     result = score(made, slam)
     assert (result.found, result.missed, result.split) == (8, 0, 0)
-    assert made.ate(slam.trajectory) < 0.5 * made.ate(made.odometry)
+    assert made.ate(slam.poses) < 0.5 * made.ate(made.odometry)
 
 
 def test_a_saved_map_is_known_again_without_ids(tmp_path):
@@ -229,8 +229,8 @@ def test_a_saved_map_is_known_again_without_ids(tmp_path):
     shown = np.concatenate(slam.assignments)
     result = score_association(again.recording.detections.pose, shown, again.thing)
     assert (result.found, result.invented, result.split) == (8, 0, 0)
-    assert set(np.unique(shown[shown >= 0])) == set(first.objects.ids.tolist())
-    assert again.ate(slam.trajectory) < 0.5 * again.ate(again.odometry)
+    assert set(np.unique(shown[shown >= 0])) == set(first.objects.object_ids.tolist())
+    assert again.ate(slam.poses) < 0.5 * again.ate(again.odometry)
 
 
 @pytest.mark.parametrize("trust", [0.5, -1.0, 1.01, float("nan")])
@@ -286,7 +286,7 @@ def test_a_drive_in_the_plane():
     )
     assert result.purity >= 0.9
     start = np.linalg.norm((slam.estimate().initial_poses - truth.poses)[:, :2], axis=1)
-    error = np.linalg.norm((slam.trajectory - truth.poses)[:, :2], axis=1)
+    error = np.linalg.norm((slam.poses - truth.poses)[:, :2], axis=1)
     assert error.mean() < 0.5 * start.mean()
 
 
@@ -300,7 +300,7 @@ def test_objects_of_a_loop_are_found_without_ids():
         slam.add(step.odometry, step.boxes)
     seen = detections.object_id[detections.pose < 200]
     assert len(np.unique(seen)) <= len(slam.objects) <= len(np.unique(seen)) + 3
-    error = (slam.trajectory - problem.truth.poses[:200])[:, :2]
+    error = (slam.poses - problem.truth.poses[:200])[:, :2]
     assert np.sqrt(np.mean(np.sum(error**2, axis=1))) < 0.1
 
 

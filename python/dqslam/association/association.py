@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from dqslam import _core
 from dqslam._checks import reject_rows
 from dqslam.association.follow import Follower
-from dqslam.association.initiation import FEWEST_VIEWS
+from dqslam.association.initiation import MIN_VIEWS
 from dqslam.association.keyframes import choose_keyframes
+from dqslam.association.labels import Labels
 from dqslam.association.noise import StepNoise
 from dqslam.association.refine import reassign, refine
 from dqslam.association.scene_map import SceneMap
@@ -81,57 +82,60 @@ def associate(
     """
     if not 0.5 < trust <= FINAL:
         raise ValueError(f"trust in ids is {trust:g}, not above 0.5 and at most 1")
-    claims = recording.detections.object_id
+    tracker_ids = recording.detections.object_id
     if trust == FINAL:
-        reject_rows("detections.object_id", claims < 0, "final ids are needed: the box has none")
+        unnamed = tracker_ids < 0
+        reject_rows("detections.object_id", unnamed, "final ids are needed: the box has none")
     recording = replace(recording, positions=None)
-    tracklet = link_tracklets(recording, claims=claims)
-    keyframes = choose_keyframes(recording, tracklet)
+    tracklets = link_tracklets(recording, tracker_ids=tracker_ids)
+    keyframes = choose_keyframes(recording, tracklets)
     used = np.isin(recording.detections.pose, keyframes)
     thin = thin_recording(recording, keyframes)
+    labels = Labels.of(thin.detections, tracklets[used])
+    labels.make_room(tracklets=int(tracklets.max(initial=-1)) + 1)
     scene = SceneMap(
         thin,
-        tracklet[used],
+        labels,
         box_noise=box_noise or BoxNoise(),
         size_prior=size_prior,
         step_noise=StepNoise.between(recording, keyframes) if estimates_noise else None,
         mode=mode,
     )
-    follower = Follower(scene, trust=trust)
-    follower.follow(lambda share: progress(0.7 * share))
-    refine(follower, lambda share: progress(0.7 + 0.2 * share))
+    follower = Follower(trust=trust)
+    follower.follow(scene, lambda share: progress(0.7 * share))
+    refine(scene, follower, lambda share: progress(0.7 + 0.2 * share))
     if trust == FINAL:
-        object_id, ids = claims.copy(), _ids_of(scene, claims[used])
+        object_id, ids = tracker_ids.copy(), _ids_of(labels, tracker_ids[used])
     else:
-        everything = _with_all_images(scene, recording, keyframes, tracklet, used)
-        reassign(everything, follower.bonus)
-        object_id, ids = _numbered(everything.box_object, len(scene.ellipsoids))
+        everything = _with_all_images(scene, recording, keyframes, tracklets, used)
+        reassign(everything, follower.switch_cost)
+        object_id, ids = _numbered(everything.labels.object_rows, len(scene.ellipsoids))
     progress(1.0)
-    left_out = {int(ids[row]): why for row, why in scene.left_out.items() if ids[row] >= 0}
+    named = {int(ids[row]): why for row, why in labels.left_out.items()}
+    left_out = {name: why for name, why in named.items() if name >= 0}
     if trust == FINAL:
         left_out |= not_found(recording, ids, used)
     return Association(object_id, keyframes, scene, ids, dict(sorted(left_out.items())))
 
 
-def _ids_of(scene: SceneMap, claims: NDArray[np.int64]) -> NDArray[np.int64]:
+def _ids_of(labels: Labels, tracker_ids: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return the final id of each object, from those of the boxes (b,); -1 of one given up."""
-    ids = np.full(len(scene.ellipsoids), -1)
-    claimed = scene.box_object >= 0
-    ids[scene.box_object[claimed]] = claims[claimed]
-    return ids
+    ids = np.full(len(labels.votes) + 1, -1)
+    ids[labels.object_rows] = tracker_ids
+    return ids[:-1]
 
 
 def not_found(
     recording: Recording, ids: NDArray[np.int64], used: NDArray[np.bool_]
 ) -> dict[int, str]:
-    """Say of final ids that are not in the map (ids, (o,)) why; ``used`` are keyframes' boxes."""
-    claims, pose = recording.detections.object_id, recording.detections.pose
-    reasons = {}
-    for name in np.setdiff1d(claims, ids).tolist():
-        views = len(np.unique(pose[used & (claims == name)]))
+    """Return why final ids are not in the map (ids, (o,)); ``used`` are keyframes' boxes."""
+    given, pose = recording.detections.object_id, recording.detections.pose
+    reasons: dict[int, str] = {}
+    for name in np.setdiff1d(given, ids).tolist():
+        views = len(np.unique(pose[used & (given == name)]))
         reasons[name] = (
-            f"seen from {views} viewpoints, {FEWEST_VIEWS} are needed"
-            if views < FEWEST_VIEWS
+            f"seen from {views} viewpoints, {MIN_VIEWS} are needed"
+            if views < MIN_VIEWS
             else "no place explains its boxes, or they leave its distance open"
         )
     return reasons
@@ -141,20 +145,17 @@ def _with_all_images(
     scene: SceneMap,
     recording: Recording,
     keyframes: NDArray[np.int64],
-    tracklet: NDArray[np.int64],
+    tracklets: NDArray[np.int64],
     used: NDArray[np.bool_],
 ) -> SceneMap:
     """Return the map with the poses and boxes between the keyframes."""
-    everything = SceneMap(
-        recording,
-        _cut_alike(tracklet, recording.detections.pose, used, scene.tracklet),
-        box_noise=scene.box_noise,
-        size_prior=scene.size_prior,
-    )
+    cut = _cut_alike(tracklets, recording.detections.pose, used, scene.labels.tracklets)
+    labels = Labels.of(recording.detections, cut)
+    labels.votes = scene.labels.votes.copy()
+    labels.object_of_tracklet = scene.labels.object_of_tracklet.copy()
+    everything = SceneMap(recording, labels, box_noise=scene.box_noise, size_prior=scene.size_prior)
     everything.poses = fill_in(recording, keyframes, scene.poses)
     everything.ellipsoids = scene.ellipsoids
-    everything.votes = scene.votes.copy()
-    everything.object_of_tracklet = dict(scene.object_of_tracklet)
     return everything
 
 

@@ -35,7 +35,7 @@ class StepNoise:
     def between(cls, recording: Recording, keyframes: NDArray[np.int64]) -> StepNoise:
         """Carry the noise of single steps on to the keyframes."""
         steps, k, _ = recording.odometry.covariance.shape
-        translation = np.arange(k) < _axes(k)
+        translation = np.arange(k) < translation_axes(k)
         units = (
             np.tile(np.diag(part * 1.0), (steps, 1, 1)) for part in (translation, ~translation)
         )
@@ -49,7 +49,7 @@ class StepNoise:
         )
 
 
-def _axes(k: int) -> int:
+def translation_axes(k: int) -> int:
     """Return how many of the k numbers of a tangent are a translation: 2 of 3, or 3 of 6."""
     return k // 2 + k % 2
 
@@ -59,8 +59,8 @@ def corrected(noise: OdometryNoise, fit: _core.Fit) -> OdometryNoise:
     k = fit.odometry_residuals.shape[1]
     better = []
     for value, part in (
-        (noise.translation_m, slice(0, _axes(k))),
-        (noise.rotation_rad, slice(_axes(k), k)),
+        (noise.translation_m, slice(0, translation_axes(k))),
+        (noise.rotation_rad, slice(translation_axes(k), k)),
     ):
         squares = np.sum(fit.odometry_residuals[:, part] ** 2)
         redundancy = np.sum(1.0 - fit.odometry_leverage[:, part])
