@@ -6,10 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dqslam import _core
-from dqslam._checks import reject_rows
+from dqslam._checks import Bools, Ints, reject_rows
 from dqslam.association.follow import Follower
 from dqslam.association.initiation import MIN_VIEWS
 from dqslam.association.keyframes import choose_keyframes
@@ -31,13 +30,13 @@ FINAL, UNSURE = 1.0, 0.9
 class Association:
     """Which boxes show the same object, and the estimate that says so."""
 
-    object_id: NDArray[np.int64]
+    object_id: Ints
     """Of each box of the recording, -1 for none, shape (m,)."""
-    keyframes: NDArray[np.int64]
+    keyframes: Ints
     """Rows of the poses whose boxes were used, shape (n,)."""
     scene: SceneMap
     """Poses of the keyframes and objects; row ``j`` is the object ``ids[j]``."""
-    ids: NDArray[np.int64]
+    ids: Ints
     """Ids of the objects, -1 for one that was given up, shape (o,)."""
     left_out: dict[int, str]
     """Ids of objects that do not fit a world at rest, and why. Their boxes keep the ids."""
@@ -118,16 +117,14 @@ def associate(
     return Association(object_id, keyframes, scene, ids, dict(sorted(left_out.items())))
 
 
-def _ids_of(labels: Labels, tracker_ids: NDArray[np.int64]) -> NDArray[np.int64]:
+def _ids_of(labels: Labels, tracker_ids: Ints) -> Ints:
     """Return the final id of each object, from those of the boxes (b,); -1 of one given up."""
     ids = np.full(len(labels.votes) + 1, -1)
     ids[labels.object_rows] = tracker_ids
     return ids[:-1]
 
 
-def not_found(
-    recording: Recording, ids: NDArray[np.int64], used: NDArray[np.bool_]
-) -> dict[int, str]:
+def not_found(recording: Recording, ids: Ints, used: Bools) -> dict[int, str]:
     """Return why final ids are not in the map (ids, (o,)); ``used`` are keyframes' boxes."""
     given, pose = recording.detections.object_id, recording.detections.pose
     reasons: dict[int, str] = {}
@@ -142,11 +139,7 @@ def not_found(
 
 
 def _with_all_images(
-    scene: SceneMap,
-    recording: Recording,
-    keyframes: NDArray[np.int64],
-    tracklets: NDArray[np.int64],
-    used: NDArray[np.bool_],
+    scene: SceneMap, recording: Recording, keyframes: Ints, tracklets: Ints, used: Bools
 ) -> SceneMap:
     """Return the map with the poses and boxes between the keyframes."""
     cut = _cut_alike(tracklets, recording.detections.pose, used, scene.labels.tracklets)
@@ -159,12 +152,7 @@ def _with_all_images(
     return everything
 
 
-def _cut_alike(
-    tracklet: NDArray[np.int64],
-    pose: NDArray[np.int64],
-    used: NDArray[np.bool_],
-    cut: NDArray[np.int64],
-) -> NDArray[np.int64]:
+def _cut_alike(tracklet: Ints, pose: Ints, used: Bools, cut: Ints) -> Ints:
     """Cut tracklets (m,) at the poses where those of the used boxes (u,) were cut."""
     result = tracklet.copy()
     known_pose = pose[used]
@@ -177,9 +165,7 @@ def _cut_alike(
     return result
 
 
-def _numbered(
-    box_object: NDArray[np.int64], count: int
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _numbered(box_object: Ints, count: int) -> tuple[Ints, Ints]:
     """Return ids by order of first boxes: of boxes (m,), and of rows (count,); -1 for none."""
     rows, first = np.unique(box_object[box_object >= 0], return_index=True)
     ids = np.full(count + 1, -1)

@@ -11,13 +11,7 @@ from dqslam._checks import Floats, Ints
 from dqslam._ids import Tracklet
 from dqslam.association.assignment import assign
 from dqslam.association.consistency import find_misfits, join_duplicates
-from dqslam.association.gating import (
-    CHI2_GATE,
-    PredictedBoxes,
-    in_image,
-    pair_costs,
-    predict_boxes,
-)
+from dqslam.association.gating import CHI2_GATE, PredictedBoxes, in_image, pair_costs, predict_boxes
 from dqslam.association.initiation import MIN_VIEWS, propose_groups
 from dqslam.association.scene_map import SceneMap
 from dqslam.association.thinning import transport

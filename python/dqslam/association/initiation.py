@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dqslam._checks import Bools, Floats, Ints
 from dqslam.association.rays import Rays, cast_rays
 from dqslam.recording import Recording
 
@@ -24,12 +24,12 @@ MAX_BOXES_COMPARED = 60
 
 def propose_groups(
     recording: Recording,
-    cameras: NDArray[np.float64],
-    rows: NDArray[np.int64],
-    tracklet: NDArray[np.int64],
+    cameras: Floats,
+    rows: Ints,
+    tracklet: Ints,
     *,
     tracklets_only: bool = False,
-) -> list[NDArray[np.int64]]:
+) -> list[Ints]:
     """Group waiting boxes: tracklets that are long enough, then boxes that meet in space.
 
     Parameters
@@ -61,17 +61,15 @@ def propose_groups(
     return [rows[group] for group in groups]
 
 
-def parallax(rays: Rays, rows: NDArray[np.int64]) -> float:
+def parallax(rays: Rays, rows: Ints) -> float:
     """Return the largest angle between two of some rays, radians."""
     cosine = rays.direction[rows] @ rays.direction[rows].T
     return float(np.arccos(np.clip(cosine.min(), -1.0, 1.0)))
 
 
-def _meeting(
-    rays: Rays, pose: NDArray[np.int64], rows: NDArray[np.int64]
-) -> list[NDArray[np.int64]]:
+def _meeting(rays: Rays, pose: Ints, rows: Ints) -> list[Ints]:
     """Group boxes by the spheres that most of them agree with, one box of each pose."""
-    groups: list[NDArray[np.int64]] = []
+    groups: list[Ints] = []
     while len(np.unique(pose[rows])) >= MIN_VIEWS:
         group = rows[_largest_group(rays, pose, rows)]
         if len(group) < MIN_VIEWS:
@@ -81,9 +79,7 @@ def _meeting(
     return groups
 
 
-def _largest_group(
-    rays: Rays, pose: NDArray[np.int64], rows: NDArray[np.int64]
-) -> NDArray[np.bool_]:
+def _largest_group(rays: Rays, pose: Ints, rows: Ints) -> Bools:
     """Let each pair of rays propose a sphere, and tell which boxes agree with the best of them."""
     center, radius = _spheres(rays, pose, rows)
     if not len(center):
@@ -107,9 +103,7 @@ def _largest_group(
     return np.asarray(agrees[np.argmax(score)])
 
 
-def _spheres(
-    rays: Rays, pose: NDArray[np.int64], rows: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _spheres(rays: Rays, pose: Ints, rows: Ints) -> tuple[Floats, Floats]:
     """Return centers (s, 3) and radii (s,) where two rays from different poses meet in front."""
     i, j = np.triu_indices(len(rows), 1)
     i, j = rows[i], rows[j]

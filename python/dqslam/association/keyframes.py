@@ -8,8 +8,8 @@ measurements that they are taken for, and there are ten times fewer of them.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dqslam._checks import Floats, Ints
 from dqslam._ids import Tracklet
 from dqslam.association.images import group_by_pose
 from dqslam.association.rays import Rays, cameras_by_odometry, cast_rays
@@ -30,10 +30,10 @@ class KeyframeChooser:
 
     def __init__(self) -> None:
         """Begin without a keyframe."""
-        self._direction: dict[Tracklet, NDArray[np.float64]] = {}
+        self._direction: dict[Tracklet, Floats] = {}
         self._half_width: dict[Tracklet, float] = {}
 
-    def choose(self, tracklets: NDArray[np.int64], rays: Rays) -> bool:
+    def choose(self, tracklets: Ints, rays: Rays) -> bool:
         """Make an image the last keyframe if its boxes are seen from a new side; return whether.
 
         They are when a quarter of their tracklets (b,) have moved by ``MIN_PARALLAX`` or grown by
@@ -55,7 +55,7 @@ class KeyframeChooser:
         return True
 
 
-def choose_keyframes(recording: Recording, tracklets: NDArray[np.int64]) -> NDArray[np.int64]:
+def choose_keyframes(recording: Recording, tracklets: Ints) -> Ints:
     """Return rows of poses, ascending, the first pose always among them.
 
     ``tracklets`` are those of the boxes, shape (m,).

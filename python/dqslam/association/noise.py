@@ -10,9 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dqslam import _core
+from dqslam._checks import Floats, Ints
 from dqslam.association.thinning import compose_covariance
 from dqslam.assumptions import OdometryNoise
 from dqslam.recording import Recording
@@ -26,13 +26,13 @@ _LEAST = 1e-6
 class StepNoise:
     """Covariance of the motion between keyframes, as a sum of two unknown levels."""
 
-    per_translation: NDArray[np.float64]
+    per_translation: Floats
     """For a sigma of 1 m a step, shape (n - 1, k, k)."""
-    per_rotation: NDArray[np.float64]
+    per_rotation: Floats
     """For a sigma of 1 rad a step, shape (n - 1, k, k)."""
 
     @classmethod
-    def between(cls, recording: Recording, keyframes: NDArray[np.int64]) -> StepNoise:
+    def between(cls, recording: Recording, keyframes: Ints) -> StepNoise:
         """Carry the noise of single steps on to the keyframes."""
         steps, k, _ = recording.odometry.covariance.shape
         translation = np.arange(k) < translation_axes(k)
@@ -41,7 +41,7 @@ class StepNoise:
         )
         return cls(*(compose_covariance(recording, unit, keyframes) for unit in units))
 
-    def covariance(self, noise: OdometryNoise) -> NDArray[np.float64]:
+    def covariance(self, noise: OdometryNoise) -> Floats:
         """Return the covariances for a level of the noise, shape (n - 1, k, k)."""
         return np.asarray(
             noise.translation_m**2 * self.per_translation

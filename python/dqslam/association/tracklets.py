@@ -8,9 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dqslam import _core
+from dqslam._checks import Bools, Floats, Ints
 from dqslam._ids import Tracklet
 from dqslam.association.images import group_by_pose
 from dqslam.association.rays import cameras_by_odometry, points_at_depth_one
@@ -36,19 +36,13 @@ class _Track:
     tracker_id: int
     """Id that a tracker gave, -1 for none."""
     pose: int
-    camera: NDArray[np.float64]
+    camera: Floats
     """world_from_camera of that pose by odometry, shape (7,)."""
-    box: NDArray[np.float64]
-    drift: NDArray[np.float64] = field(default_factory=lambda: np.zeros(2))
+    box: Floats
+    drift: Floats = field(default_factory=lambda: np.zeros(2))
     """Motion of the center per image beside what the camera's turning explains, in pixels."""
 
-    def follow(
-        self,
-        pose: int,
-        camera: NDArray[np.float64],
-        box: NDArray[np.float64],
-        predicted: NDArray[np.float64],
-    ) -> None:
+    def follow(self, pose: int, camera: Floats, box: Floats, predicted: Floats) -> None:
         """Go on with a box, and learn from where it was predicted."""
         off = _centers(box) - _centers(predicted)
         self.drift = self.drift + 0.5 * off / (pose - self.pose)
@@ -71,13 +65,8 @@ class Linker:
         """Numbers below this are taken."""
 
     def link(
-        self,
-        pose: int,
-        camera: NDArray[np.float64],
-        box: NDArray[np.float64],
-        class_id: NDArray[np.int64],
-        tracker_ids: NDArray[np.int64],
-    ) -> NDArray[np.int64]:
+        self, pose: int, camera: Floats, box: Floats, class_id: Ints, tracker_ids: Ints
+    ) -> Ints:
         """Return the number of the tracklet of each box of an image, shape (b,).
 
         Parameters
@@ -122,9 +111,7 @@ class Linker:
                 self._of_id[tracker_id] = number
 
 
-def link_tracklets(
-    recording: Recording, *, tracker_ids: NDArray[np.int64] | None = None
-) -> NDArray[np.int64]:
+def link_tracklets(recording: Recording, *, tracker_ids: Ints | None = None) -> Ints:
     """Return the number of the tracklet of each box, shape (m,), in order of their first boxes.
 
     ``tracker_ids`` (m,) are those that a tracker gave, -1 for none: all boxes of an id are one
@@ -142,13 +129,11 @@ def link_tracklets(
     return np.asarray(np.unique(tracklet, return_inverse=True)[1])
 
 
-def _centers(box: NDArray[np.float64]) -> NDArray[np.float64]:
+def _centers(box: Floats) -> Floats:
     return 0.5 * (box[..., :2] + box[..., 2:])
 
 
-def _predict(
-    tracks: list[_Track], pose: int, seen_from: NDArray[np.float64], camera: _core.Camera
-) -> NDArray[np.float64]:
+def _predict(tracks: list[_Track], pose: int, seen_from: Floats, camera: _core.Camera) -> Floats:
     """Return where the boxes of tracks are expected in the image of a pose, shape (t, 4)."""
     if not tracks:
         return np.zeros((0, 4))
@@ -168,9 +153,7 @@ def _predict(
     return np.asarray(box + np.tile(shift, (1, 2)))
 
 
-def _match(
-    predicted: NDArray[np.float64], box: NDArray[np.float64], allowed: NDArray[np.bool_]
-) -> list[tuple[int, int]]:
+def _match(predicted: Floats, box: Floats, allowed: Bools) -> list[tuple[int, int]]:
     """Pair tracks (t, 4) with boxes (b, 4) where ``allowed`` (t, b): by overlap, then the rest."""
     from scipy.optimize import linear_sum_assignment
 
@@ -187,10 +170,7 @@ def _match(
 
 
 def _only_choices(
-    pairs: list[tuple[int, int]],
-    predicted: NDArray[np.float64],
-    box: NDArray[np.float64],
-    allowed: NDArray[np.bool_],
+    pairs: list[tuple[int, int]], predicted: Floats, box: Floats, allowed: Bools
 ) -> list[tuple[int, int]]:
     """Pair what is left where neither has another choice around."""
     size, new_size = predicted[:, 2:] - predicted[:, :2], box[:, 2:] - box[:, :2]

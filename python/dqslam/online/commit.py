@@ -24,103 +24,89 @@ def commit(state: State, local: LocalMap) -> Ints:
 
     Returns the rows of its objects in the session, -1 for one that has no boxes, shape (o,).
     """
-    store, scene = state.store, local.scene
-    before, count = store.labels, state.core.num_objects
+    store, core, scene = state.store, state.core, local.scene
+    before, known = store.labels, len(local.base.votes)
     part = slice(local.first_box, local.first_box + len(scene.labels.tracklets))
     unchanged = before.object_rows[part] == local.base.object_rows[part]
     new = np.unique(scene.labels.object_rows[unchanged])
-    new = new[new >= len(local.base.votes)]
-    rows = np.arange(len(scene.ellipsoids))
-    rows[len(local.base.votes) :] = -1
-    rows[new] = count + np.arange(len(new))
+    new = new[new >= known]
+    rows = np.full(len(scene.ellipsoids), -1)
+    rows[:known] = np.arange(known)
+    rows[new] = core.num_objects + np.arange(len(new))
 
-    store.labels = _merged(before, local, rows, part, unchanged, count + len(new))
+    after = _merged(before, local, part, rows, core.num_objects + len(new))
     called = scene.labels.votes[new].argmax(axis=1)
     priors = [scene.size_prior.of(scene.class_names[one]) for one in called.tolist()]
+    moved = after.object_rows != before.object_rows
+    _relabel(state, after, moved, before.left_out, scene.ellipsoids[new], priors)
+    judged = before.left_out.keys() ^ after.left_out.keys()
+    _relabel(state, after, np.isin(after.object_rows, list(judged)), after.left_out)
+    store.labels = after
     named = state.settings.trust == FINAL
     ids = [store.tracker_id_of(row) if named else ANY_ID for row in rows[new].tolist()]
     state.registry.register(ids)
-    moved = np.flatnonzero(store.labels.object_rows != before.object_rows)
-    _relabel(state, moved, before.left_out, scene.ellipsoids[new], priors)
-    judged = before.left_out.keys() ^ store.labels.left_out.keys()
-    theirs = np.flatnonzero(np.isin(store.labels.object_rows, list(judged)))
-    _relabel(state, theirs, store.labels.left_out)
     store.size_prior = scene.size_prior
     if scene.odometry_noise != store.odometry_noise:
-        state.core.scale_odometry(*_ratio(scene.odometry_noise, store.odometry_noise))
+        core.scale_odometry(*_ratio(scene.odometry_noise, store.odometry_noise))
         store.odometry_noise = scene.odometry_noise
     return rows
 
 
-def _merged(
-    known: Labels, local: LocalMap, rows: Ints, part: slice, unchanged: Bools, count: int
-) -> Labels:
-    """Return labels with what a local map has changed in them.
+def _merged(known: Labels, local: LocalMap, part: slice, rows: Ints, count: int) -> Labels:
+    """Return what is known with what a local map has changed in it.
 
-    ``rows`` are its objects' among ``count``, ``part`` its boxes, ``unchanged`` those that show
-    what they did when it was made.
+    ``part`` are its boxes in the store, ``rows`` its objects among the ``count`` of the session.
     """
     base, now = local.base, local.scene.labels
-    labels = copy.copy(known)
-    labels.make_room(tracklets=len(now.object_of_tracklet), objects=count)
-    row_of = np.append(rows, -1)  # of an object of the local map
-    kept = np.append(np.arange(count), -1)  # of an object of the session: itself, or joined into
+    row_of = np.append(rows, -1)
+    kept = np.append(np.arange(count), -1)  # itself, or the object that it was joined into
     kept[: len(base.votes)] = row_of[now.joined_into[: len(base.votes)]]
+    merged = copy.copy(known)
+    merged.make_room(tracklets=len(now.object_of_tracklet), objects=count)
 
     shown = kept[known.object_rows]
-    shown[part] = np.where(unchanged, row_of[now.object_rows], shown[part])
+    shown[part] = _changed(shown[part], kept[base.object_rows[part]], row_of[now.object_rows])
     moved = np.flatnonzero(shown != known.object_rows)
-    labels.object_rows = known.object_rows.copy()
-    labels.release(moved)
-    labels.assign(moved, shown[moved])
-
-    cut = now.tracklets != base.tracklets[part]
-    labels.tracklets = known.tracklets.copy()
-    labels.tracklets[part] = np.where(cut, now.tracklets, known.tracklets[part])
-    own = labels.object_of_tracklet
-    then = np.full(len(own), -1)
-    then[: len(base.object_of_tracklet)] = base.object_of_tracklet
+    merged.object_rows = known.object_rows.copy()
+    merged.release(moved)
+    merged.assign(moved, shown[moved])
+    merged.tracklets = known.tracklets.copy()
+    merged.tracklets[part] = _changed(known.tracklets[part], base.tracklets[part], now.tracklets)
+    own, begun = kept[merged.object_of_tracklet], len(base.object_of_tracklet)
     found = row_of[now.object_of_tracklet]
-    free = own[: len(found)] == then[: len(found)]
-    labels.object_of_tracklet = kept[own]
-    labels.object_of_tracklet[: len(found)][free] = found[free]
+    own[:begun] = _changed(own[:begun], kept[base.object_of_tracklet], found[:begun])
+    own[begun : len(found)] = found[begun:]  # of tracklets that were cut
+    merged.object_of_tracklet = own
+    left_out = {ObjectRow(int(rows[row])): why for row, why in now.left_out.items()}
+    asked = known.left_out.keys() | left_out.keys()
+    free = {row for row in asked if known.left_out.get(row) == base.left_out.get(row)}
+    merged.left_out = {row: why for row, why in known.left_out.items() if row not in free}
+    merged.left_out |= {row: why for row, why in left_out.items() if row in free and row >= 0}
+    return merged
 
-    found_out = {rows[row]: why for row, why in now.left_out.items() if rows[row] >= 0}
-    labels.left_out = _changed(known.left_out, base.left_out, found_out)
-    return labels
 
-
-def _changed(
-    known: dict[ObjectRow, str], before: dict[ObjectRow, str], now: dict[ObjectRow, str]
-) -> dict[ObjectRow, str]:
+def _changed(known: Ints, before: Ints, now: Ints) -> Ints:
     """Return what is known, changed as ``before`` became ``now`` but for what is not as before."""
-    changed = dict(known)
-    for row in before.keys() | now.keys():
-        if before.get(row) == now.get(row) or known.get(row) != before.get(row):
-            continue
-        if row in now:
-            changed[row] = now[row]
-        else:
-            del changed[row]
-    return changed
+    return np.where(known == before, now, known)
 
 
 def _relabel(
     state: State,
-    boxes: Ints,
+    labels: Labels,
+    changed: Bools,
     left_out: Collection[ObjectRow],
     ellipsoids: Floats = _NO_ELLIPSOIDS,
     priors: Sequence[SizePrior] = (),
 ) -> None:
-    """Let the core have boxes of the store show what they do, or nothing where that is left out.
+    """Let the core have changed boxes (m,) show what they do, or nothing where that is left out.
 
     Objects above its own are new: their ellipsoids and size priors are given.
     """
-    if not boxes.size:
+    if not changed.any():
         return
-    shown = state.store.labels.object_rows[boxes]
+    shown = labels.object_rows[changed]
     state.core.relabel(
-        state.store.observation_rows[boxes],
+        state.store.observation_rows[changed],
         np.where(np.isin(shown, list(left_out)), -1, shown),
         ellipsoids,
         np.array([prior.log_mean for prior in priors]),

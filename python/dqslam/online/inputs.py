@@ -67,10 +67,7 @@ def motion_arrays(
             "no odometry leads here; across a gap, give a guess and a covariance as wide"
         )
     believed = odometry.covariance if covariance is None else covariance
-    return (
-        np.asarray(odometry.relative, dtype=np.float64),
-        np.asarray(believed, dtype=np.float64),
-    )
+    return np.asarray(odometry.relative, np.float64), np.asarray(believed, np.float64)
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,18 +27,14 @@ class IntegratedOdometry:
 
     relative: Floats
     """End in start, shape (d,)."""
-    covariance: Floats
-    """As the steps had it, shape (k, k)."""
-    per_translation: Floats
-    """For a sigma of 1 m a step, shape (k, k)."""
-    per_rotation: Floats
-    """For a sigma of 1 rad a step, shape (k, k)."""
+    covariances: Floats
+    """As the steps had it, for a sigma of 1 m a step, and for one of 1 rad a step, (3, k, k)."""
 
     @classmethod
     def of_no_steps(cls, pose_model: _core.PoseModel) -> IntegratedOdometry:
         """Stay where we are."""
-        nothing = np.zeros((tangent_size(pose_model),) * 2)
-        return cls(identity_pose(pose_model), nothing, nothing, nothing)
+        k = tangent_size(pose_model)
+        return cls(identity_pose(pose_model), np.zeros((3, k, k)))
 
     def then(
         self, pose_model: _core.PoseModel, relative: Floats, covariance: Floats
@@ -46,10 +42,9 @@ class IntegratedOdometry:
         """Go on by a step."""
         k = len(covariance)
         is_translation = np.arange(k) < translation_axes(k)
+        step = np.array([covariance, np.diag(is_translation), np.diag(~is_translation)])
         moved = transport(pose_model, relative[None])[0]
-        before = (self.covariance, self.per_translation, self.per_rotation)
-        step = (covariance, np.diag(is_translation * 1.0), np.diag(~is_translation * 1.0))
         return IntegratedOdometry(
             _core.compose(pose_model, self.relative[None], relative[None])[0],
-            *(moved @ old @ moved.T + new for old, new in zip(before, step, strict=True)),
+            moved @ self.covariances @ moved.T + step,
         )

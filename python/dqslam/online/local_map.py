@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dqslam._checks import Floats
 from dqslam.association.labels import Labels
 from dqslam.association.noise import StepNoise
 from dqslam.association.scene_map import SceneMap
@@ -35,20 +34,10 @@ def local_map(state: State, begin: int) -> LocalMap:
     poses = state.core.poses_at([frame.pose for frame in frames])
     steps = [frame.odometry for frame in frames[1:]]
     k = tangent_size(settings.pose_model)
-
-    def stacked(matrices: list[Floats]) -> Floats:
-        return np.array(matrices).reshape(-1, k, k)
-
-    odometry = Odometry(
-        settings.pose_model,
-        poses[0],
-        np.array([step.relative for step in steps]).reshape(-1, poses.shape[1]),
-        stacked([step.covariance for step in steps]),
-    )
-    noise = StepNoise(
-        stacked([step.per_translation for step in steps]),
-        stacked([step.per_rotation for step in steps]),
-    )
+    relative = np.array([step.relative for step in steps]).reshape(-1, poses.shape[1])
+    covariances = np.array([step.covariances for step in steps]).reshape(-1, 3, k, k)
+    odometry = Odometry(settings.pose_model, poses[0], relative, covariances[:, 0])
+    noise = StepNoise(covariances[:, 1], covariances[:, 2])
     first_box = int(np.searchsorted(store.box_keyframe, begin))
     labels = store.labels.since(first_box)
     times = np.array([frame.timestamp for frame in frames])

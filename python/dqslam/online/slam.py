@@ -79,18 +79,20 @@ class OnlineSlam:
         """Begin a session without a step."""
         if not 0.5 < trust_ids <= FINAL:
             raise ValueError(f"trust in ids is {trust_ids:g}, not above 0.5 and at most 1")
-        options = _core.SolveOptions() if options is None else options
-        if options.landmark_model != _core.LandmarkModel.ELLIPSOID:
+        self.camera = camera
+        self.pose_model = pose_model
+        self.solve_options = _core.SolveOptions() if options is None else options
+        if self.solve_options.landmark_model != _core.LandmarkModel.ELLIPSOID:
             raise ValueError("online: only the ellipsoid model has a prior on size")
         online = _core.OnlineOptions() if online is None else online
-        if options.loss != _core.Loss.NONE and online.loss_scale == 0.0:
-            online = _with_loss(online, options.loss_scale)
+        if self.solve_options.loss != _core.Loss.NONE and online.loss_scale == 0.0:
+            online = _with_loss(online, self.solve_options.loss_scale)
         scene = _core.ScenePriors() if scene_priors is None else scene_priors
         are_final = trust_ids == FINAL
         settings = Settings(
             camera=camera,
             pose_model=pose_model,
-            solve_options=options,
+            solve_options=self.solve_options,
             box_noise=BoxNoise() if box_noise is None else box_noise,
             size_prior=size_prior,
             believes_ids=are_final and not finds_movers,
@@ -143,21 +145,6 @@ class OnlineSlam:
     def __len__(self) -> int:
         """Return the number of steps."""
         return len(self._state.timestamps)
-
-    @property
-    def camera(self) -> _core.Camera:
-        """Of undistorted boxes, and where it is on the robot."""
-        return self._state.settings.camera
-
-    @property
-    def pose_model(self) -> _core.PoseModel:
-        """SE2 or SE3."""
-        return self._state.settings.pose_model
-
-    @property
-    def solve_options(self) -> _core.SolveOptions:
-        """Of ``polish``."""
-        return self._state.settings.solve_options
 
     @property
     def timestamps(self) -> Floats:
