@@ -29,10 +29,10 @@ for step in dq.steps_of(recording):
     now.append(slam.pose)
     linearized.append(report.linearized)
 now = np.array(now)
-last = slam.trajectory
+last = slam.poses
 slam.polish()
-polished = slam.trajectory
-print(f"{len(slam)} steps, {len(slam.objects.ids)} objects")
+polished = slam.poses
+print(f"{len(slam)} steps, {len(slam.objects.object_ids)} objects")
 
 
 # %%

@@ -68,7 +68,7 @@ def show(case: str, seed: int = 0, noise: float | None = None) -> None:
     recording = problem.recording
     before_mb = peak_memory_mb()
     slam, wall_ms, cpu_ms = feed(recording)
-    online, memory_mb = slam.trajectory, peak_memory_mb() - before_mb
+    online, memory_mb = slam.poses, peak_memory_mb() - before_mb
     started = time.perf_counter()
     polished = slam.polish().result()
     polish_s = time.perf_counter() - started
@@ -89,7 +89,7 @@ def show(case: str, seed: int = 0, noise: float | None = None) -> None:
     )
     lines.append(f"memory: {memory_mb:.1f} MB")
     lines.append(
-        f"RMSE: online {rmse(online):.4f}, polished {rmse(slam.trajectory):.4f}, "
+        f"RMSE: online {rmse(online):.4f}, polished {rmse(slam.poses):.4f}, "
         f"batch {rmse(estimate.poses):.4f} m"
     )
     lines.append(

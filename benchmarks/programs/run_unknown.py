@@ -53,11 +53,11 @@ def main(case: str, seed: int = 0, noise: float | None = None) -> None:
         + ", ".join(f"{key} {value:.3g}" for key, value in spread(taken).items())
         + " ms\n"
     )
-    tell("step by step", slam.trajectory, _by_box(slam, recording), taken.sum() / 1e3)
+    tell("step by step", slam.poses, _by_box(slam, recording), taken.sum() / 1e3)
     started = time.perf_counter()
     slam.polish()
     seconds = time.perf_counter() - started
-    tell("polished", slam.trajectory, _by_box(slam, recording), seconds)
+    tell("polished", slam.poses, _by_box(slam, recording), seconds)
     started = time.perf_counter()
     found = associate(unknown, estimates_noise=False, box_noise=NOISE)
     poses = fill_in(unknown, found.keyframes, found.scene.poses)

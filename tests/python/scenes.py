@@ -10,6 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from dqslam import Camera, Detections, Odometry, PoseModel, Recording, _core
+from dqslam.association.labels import Labels
 from dqslam.association.scene_map import SceneMap
 from dqslam.assumptions import BoxNoise, OdometryNoise
 from orbit import looking_at_origin
@@ -130,12 +131,19 @@ def map_truly(made, labels=None, *, step_noise=None):
     Poses are the odometry's, objects are where their things are when they are first seen.
     """
     labels = made.thing if labels is None else labels
-    scene = SceneMap(made.recording, labels, box_noise=BoxNoise(1.0, 0.0), step_noise=step_noise)
+    recording = made.recording
+    tracklets = np.where(labels < 0, labels.max() + 1, labels)
+    scene = SceneMap(
+        recording,
+        Labels.of(recording.detections, tracklets),
+        box_noise=BoxNoise(1.0, 0.0),
+        step_noise=step_noise,
+    )
     scene.extend(len(made.poses))
     for label in np.unique(labels[labels >= 0]):
         rows = np.flatnonzero(labels == label)
         thing = made.things[made.thing[rows[0]]]
-        center = thing.at(made.recording.detections.pose[rows[0]])
+        center = thing.at(recording.detections.pose[rows[0]])
         turn = Rotation.from_matrix(thing.turn).as_quat()
         scene.add_object(_core.ellipsoid_from_axes(center, thing.semi_axes, turn), rows)
     return scene

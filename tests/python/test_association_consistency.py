@@ -3,7 +3,7 @@ import pytest
 
 from dqslam import _core
 from dqslam.association.consistency import (
-    _usual,
+    _shortest_half,
     find_misfits,
     find_movers,
     find_scattered,
@@ -49,9 +49,9 @@ def test_a_duplicate_is_joined_and_neighbors_are_not():
     scene = estimated(made, halves(made, 2))
     assert len(scene.ellipsoids) == 4
     join_duplicates(scene)
-    np.testing.assert_array_equal(scene.box_counts, [30, 30, 30, 0])
-    np.testing.assert_array_equal(np.unique(scene.box_object[made.thing == 2]), [2])
-    assert scene.object_of_tracklet[3] == 2
+    np.testing.assert_array_equal(scene.labels.box_counts, [30, 30, 30, 0])
+    np.testing.assert_array_equal(np.unique(scene.labels.object_rows[made.thing == 2]), [2])
+    assert scene.labels.object_of_tracklet[3] == 2
 
 
 def test_neighbors_that_are_never_seen_together_are_told_apart_by_distance():
@@ -63,7 +63,7 @@ def test_neighbors_that_are_never_seen_together_are_told_apart_by_distance():
     labels[((labels == 0) & (pose >= 20)) | ((labels == 1) & (pose < 20))] = -1
     scene = estimated(made, labels)
     join_duplicates(scene)
-    np.testing.assert_array_equal(scene.box_counts, [20, 20, 40, 40])
+    np.testing.assert_array_equal(scene.labels.box_counts, [20, 20, 40, 40])
 
 
 def test_another_class_is_no_duplicate():
@@ -73,7 +73,7 @@ def test_another_class_is_no_duplicate():
     labels = np.where((made.thing == 0) == (pose < 15), made.thing, -1)
     scene = estimated(made, labels)
     join_duplicates(scene)
-    np.testing.assert_array_equal(scene.box_counts, [15, 15])
+    np.testing.assert_array_equal(scene.labels.box_counts, [15, 15])
 
 
 def test_what_is_joined_is_compared_as_one_from_then_on():
@@ -87,15 +87,15 @@ def test_what_is_joined_is_compared_as_one_from_then_on():
     scene = estimated(made, labels)
     join_duplicates(scene)
     # With 1, 0 has become an object that is seen beside 2.
-    np.testing.assert_array_equal(scene.box_counts, [20, 0, 20])
+    np.testing.assert_array_equal(scene.labels.box_counts, [20, 0, 20])
 
 
 def test_objects_that_are_left_out_are_not_joined():
     made = film(orbit_poses(20), [Thing(np.zeros(3), BALL)], noise=NOISE)
     scene = estimated(made, halves(made, 0))
-    scene.left_out = {1: "for a reason"}
+    scene.labels.left_out = {1: "for a reason"}
     join_duplicates(scene)
-    np.testing.assert_array_equal(scene.box_counts, [10, 10])
+    np.testing.assert_array_equal(scene.labels.box_counts, [10, 10])
 
 
 # --- misfits
@@ -103,7 +103,7 @@ def test_objects_that_are_left_out_are_not_joined():
 
 def test_the_usual_is_that_of_the_densest_half():
     """Of nine, the five from 0.9 to 1.1 lie nearest together."""
-    usual, spread = _usual(np.array([5.0, 0.9, 1.1, -3.0, 1.0, 0.95, 1.05, 9.0, 3.0]))
+    usual, spread = _shortest_half(np.array([5.0, 0.9, 1.1, -3.0, 1.0, 0.95, 1.05, 9.0, 3.0]))
     assert usual == pytest.approx(1.0)
     assert spread == pytest.approx(0.1 / 0.6745)
 
@@ -177,12 +177,12 @@ def test_an_id_of_two_objects_is_scattered():
     labels = np.where(made.thing == 5, 4, made.thing)
     scene = estimated(made, labels)
     assert find_scattered(scene) == {}  # as long as it has all of them
-    scene.release_all()
+    scene.labels.release_all()
     known = np.where(
         (made.thing == 5) | ((made.thing == 4) & (np.arange(len(labels)) % 5 == 0)), -1, labels
     )
-    scene.claim(np.arange(len(labels)), known)
-    scene.object_of_tracklet = {int(number): int(number) for number in range(5)}
+    scene.labels.assign(np.arange(len(labels)), known)
+    scene.labels.object_of_tracklet = {int(number): int(number) for number in range(5)}
     share = np.sum(known == 4) / 80
     expected = f"one place explains {share:.0%} of its boxes: it moved, or its id names several"
     assert find_scattered(scene) == {4: expected}
@@ -205,9 +205,9 @@ def test_an_object_that_moves_along_with_the_camera_is_found(seed):
     assert movers[5].startswith("without it, the path explains its boxes")
     np.testing.assert_array_equal(scene.poses, before[0])
     np.testing.assert_array_equal(scene.ellipsoids, before[1])
-    assert scene.left_out == {}
+    assert scene.labels.left_out == {}
     bent = made.ate(scene.poses)
-    scene.left_out = movers
+    scene.labels.left_out = movers
     scene.estimate(max_iterations=50)
     assert made.ate(scene.poses) < bent
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from dqslam.association import cameras_by_odometry, cast_rays
-from dqslam.association.initiation import FEWEST_VIEWS, LEAST_PARALLAX, parallax, propose_groups
+from dqslam.association.initiation import MIN_PARALLAX, MIN_VIEWS, parallax, propose_groups
 from scenes import Thing, film, orbit_poses, street_poses, table_things
 
 # --- rays
@@ -72,7 +72,7 @@ def test_boxes_of_objects_are_found_among_clutter(seed):
         assert right >= len(most) - 1  # a box of nothing may agree
     for group in groups:
         poses = made.recording.detections.pose[group]
-        assert len(np.unique(poses)) == len(poses) >= FEWEST_VIEWS
+        assert len(np.unique(poses)) == len(poses) >= MIN_VIEWS
 
 
 def test_classes_are_not_mixed():
@@ -92,7 +92,7 @@ def test_tracklets_that_are_long_enough_are_groups_by_themselves():
     assert [shown(made, group) for group in groups] == [{0}, {1}]
     # Of too few boxes, they meet others in space, unless ids are final.
     tracklet = 2 * (made.recording.detections.pose // 3) + made.thing
-    assert np.bincount(tracklet).max() < FEWEST_VIEWS
+    assert np.bincount(tracklet).max() < MIN_VIEWS
     assert sum(len(group) for group in groups_of(made, tracklet)) == len(made.thing)
     assert groups_of(made, tracklet, tracklets_only=True) == []
 
@@ -104,7 +104,7 @@ def test_without_parallax_nothing_starts():
     made = film(poses, [thing])
     assert groups_of(made, made.thing) == []
     assert groups_of(made) == []
-    poses[:, 0] = np.linspace(0.0, 10.0 * 1.2 * LEAST_PARALLAX, 6)
+    poses[:, 0] = np.linspace(0.0, 10.0 * 1.2 * MIN_PARALLAX, 6)
     assert len(groups_of(film(poses, [thing]), made.thing)) == 1
 
 
@@ -115,7 +115,7 @@ def test_rays_that_meet_behind_the_cameras_are_no_object():
     path = np.array([[1.0 * i, 0.0, 5.0] for i in range(6)])
     made = film(poses, [Thing(path[0], np.full(3, 0.3), path=path)])
     rays = cast_rays(made.recording, cameras_by_odometry(made.recording))
-    assert parallax(rays, np.arange(6)) > 2 * LEAST_PARALLAX
+    assert parallax(rays, np.arange(6)) > 2 * MIN_PARALLAX
     assert groups_of(made) == []
 
 

@@ -21,7 +21,7 @@ def test_right_boxes_that_were_refused_come_back_and_straighten_the_path():
     recording, truth = simulate(load_scenario("paper"), seed=0)
     found = associate(replace(recording, positions=None), trust=1.0, estimates_noise=False)
     true = truth.poses[found.keyframes]
-    assert (found.scene.box_object >= 0).all()
+    assert (found.scene.labels.object_rows >= 0).all()
     assert found.left_out == {}
     assert position_error(truth.pose_model, found.scene.poses, true) < 0.1
 
@@ -34,23 +34,23 @@ def scene(files):
 
 
 def test_what_fits_stays_as_it_is(scene):
-    before, boxes = scene.poses.copy(), scene.box_object.copy()
+    before, boxes = scene.poses.copy(), scene.labels.object_rows.copy()
     try_refused(scene)
-    np.testing.assert_array_equal(scene.box_object, boxes)
+    np.testing.assert_array_equal(scene.labels.object_rows, boxes)
     np.testing.assert_allclose(scene.poses, before, atol=1e-3)
-    assert scene.left_out == {}
+    assert scene.labels.left_out == {}
 
 
 def test_an_object_whose_boxes_agree_on_nothing_is_left_out_with_a_reason(scene):
     """Its boxes jump about the image: none but those of two images may fit one place."""
     boxes = scene.recording.detections
     rows = np.flatnonzero(boxes.object_id == 101)[2:]
-    number = scene.box_object[rows[0]]
+    number = scene.labels.object_rows[rows[0]]
     corner = np.random.default_rng(0).uniform(0.0, 400.0, (len(rows), 2))
     jumping = boxes.box.copy()
     jumping[rows] = np.hstack([corner, corner + 30.0])
     scene.recording = replace(scene.recording, detections=replace(boxes, box=jumping))
     try_refused(scene)
-    assert list(scene.left_out) == [number]
-    assert scene.left_out[number].startswith("one place explains ")
-    assert (scene.box_object[boxes.object_id != 101] >= 0).all()
+    assert list(scene.labels.left_out) == [number]
+    assert scene.labels.left_out[number].startswith("one place explains ")
+    assert (scene.labels.object_rows[boxes.object_id != 101] >= 0).all()

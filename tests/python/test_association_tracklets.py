@@ -4,7 +4,7 @@ from scipy.spatial.transform import Rotation
 
 from dqslam import Detections, Odometry, PoseModel, Recording
 from dqslam.association import link_tracklets
-from dqslam.association.keyframes import GROWTH, PARALLAX, choose_keyframes
+from dqslam.association.keyframes import MIN_GROWTH, MIN_PARALLAX, choose_keyframes
 from scenes import CAMERA, Thing, film, street_poses
 
 STILL = np.array([0, 0, 0, 0, 0, 0, 1.0])
@@ -83,8 +83,8 @@ def test_without_overlap_only_what_has_no_choice_is_linked(jump, rival, expected
 
 def test_ids_of_a_tracker_join_and_separate():
     boxes = [(0, 100, 100, 40), (1, 100, 100, 40), (9, 400, 100, 40), (10, 400, 100, 40)]
-    claims = np.array([7, 8, 7, -1])
-    np.testing.assert_array_equal(link_tracklets(recording(boxes), claims=claims), [0, 1, 0, 2])
+    ids = np.array([7, 8, 7, -1])
+    np.testing.assert_array_equal(link_tracklets(recording(boxes), tracker_ids=ids), [0, 1, 0, 2])
 
 
 def test_the_order_of_the_rows_does_not_matter():
@@ -113,20 +113,20 @@ def seen(poses, things):
 
 
 def test_keyframes_of_a_path_of_known_parallax():
-    """An object 10 m ahead, passed in steps of 0.11 m: 0.011 rad each, five make ``PARALLAX``."""
+    """An object 10 m ahead, passed in steps of 0.11 m: five times 0.011 rad are a new side."""
     poses = np.tile(STILL, (21, 1))
     poses[:, 0] = np.linspace(-1.1, 1.1, 21)
     thing = Thing(np.array([0.0, 0.0, 10.0]), np.full(3, 0.3))
-    assert 4 * 0.011 < PARALLAX < 5 * 0.0107
+    assert 4 * 0.011 < MIN_PARALLAX < 5 * 0.0107
     np.testing.assert_array_equal(seen(poses, [thing]), [0, 5, 10, 15, 20])
 
 
 def test_keyframes_of_a_drive_towards_an_object():
-    """The image of what is ahead grows as the distance shrinks, by the factor 1 + ``GROWTH``."""
+    """The image of what is ahead grows as the distance shrinks, by 1 + ``MIN_GROWTH``."""
     distance = 10.0 - np.arange(40) * 0.2
     expected = [0]
     for pose in range(40):
-        if distance[expected[-1]] / distance[pose] >= 1.0 + GROWTH:
+        if distance[expected[-1]] / distance[pose] >= 1.0 + MIN_GROWTH:
             expected.append(pose)
     thing = Thing(np.array([0.0, 0.0, 10.0]), np.full(3, 0.01))
     assert len(expected) > 8

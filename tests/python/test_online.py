@@ -39,9 +39,9 @@ def rmse(poses, truth):
 
 def bits(slam):
     return (
-        slam.trajectory.tobytes(),
+        slam.poses.tobytes(),
         slam.objects.ellipsoids.tobytes(),
-        slam.objects.ids.tobytes(),
+        slam.objects.object_ids.tobytes(),
         slam.timestamps.tobytes(),
     )
 
@@ -53,7 +53,7 @@ def test_without_objects_it_is_dead_reckoning(problem):
         slam.add(Motion([1.0, 0.0, np.pi / 2.0], np.eye(3)))
     # A square of 1 m, by hand.
     np.testing.assert_allclose(
-        slam.trajectory,
+        slam.poses,
         [[0, 0, 0], [1, 0, np.pi / 2], [1, 1, np.pi], [0, 1, 1.5 * np.pi]],
         atol=1e-12,
     )
@@ -66,7 +66,7 @@ def test_one_box_puts_a_sphere_where_its_size_says(problem):
     slam = session(problem, size_prior=dq.SizePrior(np.log(0.3), 0.7))
     slam.add(None, StepBoxes([[594.5, 466.5, 684.5, 556.5]], [7]))
     objects = slam.objects
-    assert objects.ids.tolist() == [7]
+    assert objects.object_ids.tolist() == [7]
     assert objects.class_names == ("object",)
     # tan of half the angle is 0.03: depth radius / sin; the camera looks along +y, 1 m above.
     depth = 0.3 / np.sin(np.arctan(0.03))
@@ -80,7 +80,7 @@ def test_a_polish_finds_what_solve_finds(problem):
     slam = fed(problem)
     polished = slam.polish().result()
     assert polished.cost == pytest.approx(summary.final_cost, rel=1e-6)
-    np.testing.assert_allclose(slam.trajectory, estimate.poses, atol=2e-3)
+    np.testing.assert_allclose(slam.poses, estimate.poses, atol=2e-3)
     found = slam.estimate()
     assert found.object_ids.tolist() == estimate.object_ids.tolist()
     assert found.observations.tolist() == estimate.observations.tolist()
@@ -93,9 +93,9 @@ def test_before_a_polish_it_is_nearly_as_good():
     for seed in range(3):
         drawn = paper(seed, 1.0)
         slam = fed(drawn)
-        before.append(rmse(slam.trajectory, drawn.truth))
+        before.append(rmse(slam.poses, drawn.truth))
         slam.polish()
-        after.append(rmse(slam.trajectory, drawn.truth))
+        after.append(rmse(slam.poses, drawn.truth))
     assert np.mean(before) <= 1.5 * np.mean(after)
     assert np.mean(after) < 0.15
 
@@ -112,8 +112,8 @@ def test_it_does_not_depend_on_the_world_frame(problem):
     here = fed(problem, 150)
     start = np.array([3.0, -2.0, 1.0])
     there = fed(problem, 150, first_pose=start)
-    moved = _core.compose(dq.PoseModel.SE2, np.repeat(start[None], 150, axis=0), here.trajectory)
-    np.testing.assert_allclose(there.trajectory, moved, atol=1e-5)
+    moved = _core.compose(dq.PoseModel.SE2, np.repeat(start[None], 150, axis=0), here.poses)
+    np.testing.assert_allclose(there.poses, moved, atol=1e-5)
 
 
 def test_the_same_steps_give_the_same_bits(problem):
@@ -201,18 +201,18 @@ def test_a_step_without_boxes_is_one(problem):
 def test_a_merged_polish_loses_nothing(problem):
     steps = list(steps_of(problem.recording))
     slam = fed(problem, 200)
-    before = slam.trajectory
+    before = slam.poses
     work = slam.polish(background=True)
     work.result()
     polisher = slam._polisher
     polisher._polish, late = None, polisher._polish  # as if it were not done yet
     for step in steps[200:260]:
         slam.add(step.odometry, step.boxes, timestamp=step.timestamp)
-    arrived = slam.trajectory
+    arrived = slam.poses
     between = _core.between(dq.PoseModel.SE2, arrived[199:200].repeat(60, 0), arrived[200:])
     polisher._polish = late
     polisher.take()
-    merged = slam.trajectory
+    merged = slam.poses
     assert len(merged) == 260 and len(before) == 200
     np.testing.assert_allclose(merged[:200], work.result().poses, atol=1e-12)
     # What came later stands to the last polished pose as it did.
@@ -239,7 +239,7 @@ def test_a_wrong_box_pulls_less_with_a_loss(problem):
             has_first = 0 in step.boxes.object_id
             boxes = wrong if number >= 60 and number % 5 == 0 and has_first else step.boxes
             slam.add(step.odometry, boxes)
-        errors.append(np.abs(slam.trajectory - problem.truth.poses[:120]).max())
+        errors.append(np.abs(slam.poses - problem.truth.poses[:120]).max())
     assert errors[1] < 0.2
     assert errors[1] <= errors[0]
 
@@ -273,4 +273,4 @@ def test_in_se3_it_finds_what_solve_finds():
     assert len(list(replay(slam, recording))) == len(recording.timestamps)
     _, summary = solve(build_graph(recording))
     assert slam.polish().result().cost == pytest.approx(summary.final_cost, rel=1e-6)
-    np.testing.assert_allclose(np.linalg.norm(slam.trajectory[:, 3:], axis=1), 1.0, atol=1e-9)
+    np.testing.assert_allclose(np.linalg.norm(slam.poses[:, 3:], axis=1), 1.0, atol=1e-9)

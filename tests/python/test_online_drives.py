@@ -23,7 +23,7 @@ def errors(camera, given, truth):
     """RMSE before a polish and after it, meters."""
 
     def rmse():
-        apart = (slam.trajectory - truth)[:, :2]
+        apart = (slam.poses - truth)[:, :2]
         return np.sqrt(np.mean(np.sum(apart**2, axis=1)))
 
     slam = OnlineSlam(camera, box_noise=NOISE)

@@ -1,7 +1,7 @@
 """Boxes of a session without ids: which objects they show, as they arrive and after a polish."""
 
+import copy
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,9 +12,10 @@ from dqslam.association.thinning import thin_recording
 from dqslam.assumptions import BoxNoise, OdometryNoise
 from dqslam.metrics import score_association
 from dqslam.online import Motion, OnlineSlam, StepBoxes, StepError, replay, steps_of
-from dqslam.online.integrated_odometry import Leg
-from dqslam.online.keyframes import Journal
-from dqslam.online.look_back import Reach
+from dqslam.online.commit import commit
+from dqslam.online.integrated_odometry import IntegratedOdometry
+from dqslam.online.local_map import local_map
+from dqslam.online.look_back import LookBackBudget
 from scenes import CAMERA, Film, Thing, film, orbit_poses, switched_ids, table_things
 from test_association_consistency import circle
 
@@ -51,7 +52,7 @@ def followed(made: Film, recording=None, **options):
 
 def bits(slam):
     shown = np.concatenate(slam.assignments) if slam.assignments else np.zeros(0)
-    return slam.trajectory.tobytes(), slam.objects.ellipsoids.tobytes(), shown.tobytes()
+    return slam.poses.tobytes(), slam.objects.ellipsoids.tobytes(), shown.tobytes()
 
 
 def score(made: Film, slam: OnlineSlam):
@@ -66,7 +67,7 @@ def assert_found(made: Film, slam: OnlineSlam, *, recall):
     assert result.purity >= 0.98
     assert result.recall >= recall
     assert slam.left_out == {}
-    assert slam.count == len(slam.objects) == 8
+    assert slam.num_objects == len(slam.objects) == 8
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -76,10 +77,10 @@ def test_boxes_find_their_objects_as_they_arrive(seed):
     result = score(made, slam)
     assert result.found == 8
     assert result.purity >= 0.95
-    assert made.ate(slam.trajectory) < 0.5 * made.ate(made.odometry)
+    assert made.ate(slam.poses) < 0.5 * made.ate(made.odometry)
     slam.polish()
     assert_found(made, slam, recall=0.9)
-    assert made.ate(slam.trajectory) < 0.5 * made.ate(made.odometry)
+    assert made.ate(slam.poses) < 0.5 * made.ate(made.odometry)
     for center in slam.objects.centers:
         assert np.linalg.norm(made.centers - center, axis=1).min() < 0.08
 
@@ -102,7 +103,7 @@ def test_the_level_of_the_noise_is_estimated():
     slam.polish()
     assert slam.odometry_noise.translation_m == pytest.approx(0.02, rel=0.5)
     assert slam.odometry_noise.rotation_rad == pytest.approx(0.01, rel=0.5)
-    assert made.ate(slam.trajectory) < 0.5 * made.ate(made.odometry)
+    assert made.ate(slam.poses) < 0.5 * made.ate(made.odometry)
 
 
 def test_ids_that_switch_are_cut_and_joined():
@@ -130,11 +131,11 @@ def test_what_moves_is_left_out_and_said():
     for number, why in slam.left_out.items():
         assert "it moved" in why
         assert set(made.thing[shown == number].tolist()) == {7}
-        assert number not in slam.objects.ids
+        assert number not in slam.objects.object_ids
         assert slam.estimate().dropped[number] == why
-    mapped = made.thing[np.isin(shown, slam.objects.ids)]
+    mapped = made.thing[np.isin(shown, slam.objects.object_ids)]
     assert set(range(7)) <= set(mapped.tolist())
-    assert made.ate(slam.trajectory) < 0.5 * made.ate(made.odometry)
+    assert made.ate(slam.poses) < 0.5 * made.ate(made.odometry)
 
 
 def test_the_same_steps_give_the_same_bits():
@@ -157,24 +158,46 @@ def test_what_arrives_during_a_polish_is_kept():
     assert_found(made, slam, recall=0.9)
 
 
-def test_a_late_polish_overrules_nothing_that_has_changed_meanwhile():
-    """A tracklet and an object left out since stay; changes of the part are taken over."""
-    made = table(0)
-    slam = followed(made)
-    journal, identifier = slam._journal, slam._identifier
-    part = identifier._part(slam._session, 0)
-    mine, theirs = sorted(journal.object_of_tracklet)[:2]
-    part.scene.object_of_tracklet[mine] = 1
-    part.scene.left_out[2] = "it moved"
-    journal.object_of_tracklet[theirs] = 3
-    journal.left_out = {4: "it moved, too"}
-    tracklet = journal.keyframes[5].tracklet
-    journal.keyframes[5].tracklet = tracklet + 1000
-    identifier._tell(slam._session, slam._registry, part)
-    assert journal.object_of_tracklet[mine] == 1
-    assert journal.object_of_tracklet[theirs] == 3
-    assert set(journal.left_out) == {2, 4}
-    np.testing.assert_array_equal(journal.keyframes[5].tracklet, tracklet + 1000)
+def test_a_late_commit_overrules_nothing_that_has_changed_meanwhile():
+    """A box, a tracklet and an object left out since stay; changes of the map are taken over."""
+    state = followed(table(0))._state
+    store = state.store
+    local, before = local_map(state, 0), store.labels
+    here, there = local.scene.labels, copy.deepcopy(before)
+    mine, theirs, both = np.flatnonzero(before.object_rows == 0)[:3]
+    here.release(np.array([mine, both]))
+    here.left_out[2] = "it moved"
+    here.object_of_tracklet[before.tracklets[mine]] = 1
+    there.release(np.array([theirs]))
+    there.cut_tracklet(np.array([both]))
+    there.object_rows[both] = 3
+    there.object_of_tracklet[before.tracklets[theirs]] = 3
+    there.left_out = {4: "it moved, too"}
+    store.labels = there
+    commit(state, local)
+    expected = before.object_rows.copy()
+    expected[[mine, theirs, both]] = -1, -1, 3
+    np.testing.assert_array_equal(store.labels.object_rows, expected)
+    assert store.labels.object_of_tracklet[before.tracklets[mine]] == 1
+    assert store.labels.object_of_tracklet[before.tracklets[theirs]] == 3
+    np.testing.assert_array_equal(store.labels.tracklets, there.tracklets)
+    assert set(store.labels.left_out) == {2, 4}
+    assert before.object_rows[mine] == 0  # a snapshot keeps what it has
+
+
+def test_an_object_that_is_joined_takes_its_earlier_boxes_along():
+    """Boxes before the local map, whose object is given up in it, and their tracklets."""
+    state = followed(table(0))._state
+    store = state.store
+    shown, own = store.labels.object_rows.copy(), store.labels.object_of_tracklet.copy()
+    local = local_map(state, len(store.keyframes) - 5)
+    assert (shown[: local.first_box] == 1).any()
+    local.scene.labels.join_objects(0, 1)
+    commit(state, local)
+    np.testing.assert_array_equal(store.labels.object_rows, np.where(shown == 1, 0, shown))
+    np.testing.assert_array_equal(store.labels.object_of_tracklet, np.where(own == 1, 0, own))
+    assert state.core.observations[1] == 0
+    assert store.labels.box_counts[0] == np.sum(shown <= 1) - np.sum(shown < 0)
 
 
 def test_a_box_that_is_not_finite_is_named():
@@ -208,7 +231,7 @@ def test_boxes_with_ids_and_without_are_objects_of_their_own():
     np.testing.assert_array_equal(shown[half >= 0], half[half >= 0])
     result = score(made, slam)
     assert (result.found, result.missed, result.split) == (8, 0, 0)
-    assert made.ate(slam.trajectory) < 0.5 * made.ate(made.odometry)
+    assert made.ate(slam.poses) < 0.5 * made.ate(made.odometry)
 
 
 def test_a_saved_map_is_known_again_without_ids(tmp_path):
@@ -229,8 +252,8 @@ def test_a_saved_map_is_known_again_without_ids(tmp_path):
     shown = np.concatenate(slam.assignments)
     result = score_association(again.recording.detections.pose, shown, again.thing)
     assert (result.found, result.invented, result.split) == (8, 0, 0)
-    assert set(np.unique(shown[shown >= 0])) == set(first.objects.ids.tolist())
-    assert again.ate(slam.trajectory) < 0.5 * again.ate(again.odometry)
+    assert set(np.unique(shown[shown >= 0])) == set(first.objects.object_ids.tolist())
+    assert again.ate(slam.poses) < 0.5 * again.ate(again.odometry)
 
 
 @pytest.mark.parametrize("trust", [0.5, -1.0, 1.01, float("nan")])
@@ -239,33 +262,32 @@ def test_trust_out_of_range(trust):
         OnlineSlam(CAMERA, trust_ids=trust)
 
 
-def test_a_leg_is_what_thinning_makes_of_its_steps():
+def test_integrated_odometry_is_what_thinning_makes_of_its_steps():
     """Two ways to the same motion and covariance: step by step, and from the whole path."""
     made = table(0)
     odometry = made.recording.odometry
-    leg = Leg.of_no_steps(odometry.pose_model)
+    steps = IntegratedOdometry.of_no_steps(odometry.pose_model)
     for relative, covariance in zip(odometry.relative[:7], odometry.covariance[:7], strict=True):
-        leg = leg.then(odometry.pose_model, relative, covariance)
+        steps = steps.then(odometry.pose_model, relative, covariance)
     thin = thin_recording(made.recording, np.array([0, 7])).odometry
-    np.testing.assert_allclose(leg.relative, thin.relative[0], atol=1e-12)
-    np.testing.assert_allclose(leg.covariance, thin.covariance[0], rtol=1e-9, atol=1e-15)
-    levels = 0.02**2 * leg.per_translation + 0.01**2 * leg.per_rotation
-    np.testing.assert_allclose(levels, leg.covariance, rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(steps.relative, thin.relative[0], atol=1e-12)
+    as_given, per_translation, per_rotation = steps.covariances
+    np.testing.assert_allclose(as_given, thin.covariance[0], rtol=1e-9, atol=1e-15)
+    levels = 0.02**2 * per_translation + 0.01**2 * per_rotation
+    np.testing.assert_allclose(levels, as_given, rtol=1e-9, atol=1e-15)
 
 
 def test_a_look_far_back_is_paid_from_savings():
     """Windows of 40 keyframes, one earned at each: 100 keyframes back cost two and a half."""
-    reach, journal = Reach(), Journal(None)
-    journal.keyframes = [None] * 161
-    part = SimpleNamespace(begin=120)
+    budget = LookBackBudget()
     for _ in range(3):
-        assert reach.window(journal) == 120
-    assert reach._afford([40, 60], part, last=160) == 40
-    assert reach._afford([60], part, last=160) == 120  # nothing is left
-    reach.window(journal)
-    reach.window(journal)
-    assert reach._afford([60, 100], part, last=160) == 100
-    assert reach._afford([], part, last=160) == 120
+        assert budget.next_window(161) == 120
+    assert budget._spend([40, 60], 120, last=160) == 40
+    assert budget._spend([60], 120, last=160) == 120  # nothing is left
+    budget.next_window(161)
+    budget.next_window(161)
+    assert budget._spend([60, 100], 120, last=160) == 100
+    assert budget._spend([], 120, last=160) == 120
 
 
 def test_a_drive_in_the_plane():
@@ -286,7 +308,7 @@ def test_a_drive_in_the_plane():
     )
     assert result.purity >= 0.9
     start = np.linalg.norm((slam.estimate().initial_poses - truth.poses)[:, :2], axis=1)
-    error = np.linalg.norm((slam.trajectory - truth.poses)[:, :2], axis=1)
+    error = np.linalg.norm((slam.poses - truth.poses)[:, :2], axis=1)
     assert error.mean() < 0.5 * start.mean()
 
 
@@ -300,7 +322,7 @@ def test_objects_of_a_loop_are_found_without_ids():
         slam.add(step.odometry, step.boxes)
     seen = detections.object_id[detections.pose < 200]
     assert len(np.unique(seen)) <= len(slam.objects) <= len(np.unique(seen)) + 3
-    error = (slam.trajectory - problem.truth.poses[:200])[:, :2]
+    error = (slam.poses - problem.truth.poses[:200])[:, :2]
     assert np.sqrt(np.mean(np.sum(error**2, axis=1))) < 0.1
 
 

@@ -64,10 +64,10 @@ def test_coming_back_closes_the_loop(drive):
     before, after = errors[closed[0] - 5], np.median(errors[-20:])
     assert before > 1.0
     assert after < 0.2 * before
-    path = slam.trajectory
+    path = slam.poses
     rmse = np.sqrt(np.mean(np.sum((path - truth)[:, :2] ** 2, axis=1)))
     slam.polish()
-    polished = np.sqrt(np.mean(np.sum((slam.trajectory - truth)[:, :2] ** 2, axis=1)))
+    polished = np.sqrt(np.mean(np.sum((slam.poses - truth)[:, :2] ** 2, axis=1)))
     assert rmse <= 1.5 * polished
 
 

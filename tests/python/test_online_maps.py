@@ -85,7 +85,7 @@ def test_too_few_boxes_are_refused(problem, mapped, again):
 
 
 def test_boxes_of_nowhere_are_refused(mapped):
-    ids = mapped.objects.ids[:4]
+    ids = mapped.objects.object_ids[:4]
     boxes = StepBoxes(
         [[10, 10, 20, 900], [300, 10, 1200, 20], [600, 10, 610, 20], [0, 0, 5, 5]], ids
     )
@@ -122,8 +122,8 @@ def test_a_symmetric_map_is_ambiguous():
 def test_a_saved_map_comes_back(mapped, saved):
     known = load_map(saved)
     objects = mapped.objects
-    order = np.argsort(objects.ids)
-    assert known.ids == objects.ids[order].tolist()
+    order = np.argsort(objects.object_ids)
+    assert known.object_ids == objects.object_ids[order].tolist()
     assert known.class_names == tuple(objects.class_names[row] for row in order)
     np.testing.assert_allclose(known.ellipsoids, objects.ellipsoids[order], atol=1e-6)
     assert (np.linalg.eigvalsh(known.covariances) > 0.0).all()
@@ -143,10 +143,10 @@ def test_a_saved_map_is_continued(problem, saved, again):
     known = len(slam.objects)
     for step in steps[again + 1 : 480]:
         slam.add(step.odometry, step.boxes)
-    error = np.hypot(*(slam.trajectory - truth[again:480])[:, :2].T)
+    error = np.hypot(*(slam.poses - truth[again:480])[:, :2].T)
     assert error.max() < 0.3
     assert np.isfinite(slam.polish().result().cost)
-    assert np.hypot(*(slam.trajectory - truth[again:480])[:, :2].T).max() < 0.3
+    assert np.hypot(*(slam.poses - truth[again:480])[:, :2].T).max() < 0.3
     assert len(slam.objects) == known  # all had been seen before
 
 

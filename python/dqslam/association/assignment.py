@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from dqslam._checks import Floats, Ints
 
 # Stands for infinity, which the solver of the assignment refuses when nothing else is left.
 _FORBIDDEN = 1e9
 
 
-def assign(
-    cost: NDArray[np.float64], null: NDArray[np.float64]
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def assign(cost: Floats, null: Floats) -> tuple[Ints, Floats]:
     """Choose the assignment of least total cost, and tell how sure each of its pairs is.
 
     Parameters

@@ -6,13 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dqslam import _core
-from dqslam._checks import reject_rows
+from dqslam._checks import Bools, Ints, reject_rows
 from dqslam.association.follow import Follower
-from dqslam.association.initiation import FEWEST_VIEWS
+from dqslam.association.initiation import MIN_VIEWS
 from dqslam.association.keyframes import choose_keyframes
+from dqslam.association.labels import Labels
 from dqslam.association.noise import StepNoise
 from dqslam.association.refine import reassign, refine
 from dqslam.association.scene_map import SceneMap
@@ -30,13 +30,13 @@ FINAL, UNSURE = 1.0, 0.9
 class Association:
     """Which boxes show the same object, and the estimate that says so."""
 
-    object_id: NDArray[np.int64]
+    object_id: Ints
     """Of each box of the recording, -1 for none, shape (m,)."""
-    keyframes: NDArray[np.int64]
+    keyframes: Ints
     """Rows of the poses whose boxes were used, shape (n,)."""
     scene: SceneMap
     """Poses of the keyframes and objects; row ``j`` is the object ``ids[j]``."""
-    ids: NDArray[np.int64]
+    ids: Ints
     """Ids of the objects, -1 for one that was given up, shape (o,)."""
     left_out: dict[int, str]
     """Ids of objects that do not fit a world at rest, and why. Their boxes keep the ids."""
@@ -81,89 +81,78 @@ def associate(
     """
     if not 0.5 < trust <= FINAL:
         raise ValueError(f"trust in ids is {trust:g}, not above 0.5 and at most 1")
-    claims = recording.detections.object_id
+    tracker_ids = recording.detections.object_id
     if trust == FINAL:
-        reject_rows("detections.object_id", claims < 0, "final ids are needed: the box has none")
+        unnamed = tracker_ids < 0
+        reject_rows("detections.object_id", unnamed, "final ids are needed: the box has none")
     recording = replace(recording, positions=None, measurements=())
-    tracklet = link_tracklets(recording, claims=claims)
-    keyframes = choose_keyframes(recording, tracklet)
+    tracklets = link_tracklets(recording, tracker_ids=tracker_ids)
+    keyframes = choose_keyframes(recording, tracklets)
     used = np.isin(recording.detections.pose, keyframes)
     thin = thin_recording(recording, keyframes)
+    labels = Labels.of(thin.detections, tracklets[used])
+    labels.make_room(tracklets=int(tracklets.max(initial=-1)) + 1)
     scene = SceneMap(
         thin,
-        tracklet[used],
+        labels,
         box_noise=box_noise or BoxNoise(),
         size_prior=size_prior,
         step_noise=StepNoise.between(recording, keyframes) if estimates_noise else None,
         mode=mode,
     )
-    follower = Follower(scene, trust=trust)
-    follower.follow(lambda share: progress(0.7 * share))
-    refine(follower, lambda share: progress(0.7 + 0.2 * share))
+    follower = Follower(trust=trust)
+    follower.follow(scene, lambda share: progress(0.7 * share))
+    refine(scene, follower, lambda share: progress(0.7 + 0.2 * share))
     if trust == FINAL:
-        object_id, ids = claims.copy(), _ids_of(scene, claims[used])
+        object_id, ids = tracker_ids.copy(), _ids_of(labels, tracker_ids[used])
     else:
-        everything = _with_all_images(scene, recording, keyframes, tracklet, used)
-        reassign(everything, follower.bonus)
-        object_id, ids = _numbered(everything.box_object, len(scene.ellipsoids))
+        everything = _with_all_images(scene, recording, keyframes, tracklets, used)
+        reassign(everything, follower.switch_cost)
+        object_id, ids = _numbered(everything.labels.object_rows, len(scene.ellipsoids))
     progress(1.0)
-    left_out = {int(ids[row]): why for row, why in scene.left_out.items() if ids[row] >= 0}
+    named = {int(ids[row]): why for row, why in labels.left_out.items()}
+    left_out = {name: why for name, why in named.items() if name >= 0}
     if trust == FINAL:
         left_out |= not_found(recording, ids, used)
     return Association(object_id, keyframes, scene, ids, dict(sorted(left_out.items())))
 
 
-def _ids_of(scene: SceneMap, claims: NDArray[np.int64]) -> NDArray[np.int64]:
+def _ids_of(labels: Labels, tracker_ids: Ints) -> Ints:
     """Return the final id of each object, from those of the boxes (b,); -1 of one given up."""
-    ids = np.full(len(scene.ellipsoids), -1)
-    claimed = scene.box_object >= 0
-    ids[scene.box_object[claimed]] = claims[claimed]
-    return ids
+    ids = np.full(len(labels.votes) + 1, -1)
+    ids[labels.object_rows] = tracker_ids
+    return ids[:-1]
 
 
-def not_found(
-    recording: Recording, ids: NDArray[np.int64], used: NDArray[np.bool_]
-) -> dict[int, str]:
-    """Say of final ids that are not in the map (ids, (o,)) why; ``used`` are keyframes' boxes."""
-    claims, pose = recording.detections.object_id, recording.detections.pose
-    reasons = {}
-    for name in np.setdiff1d(claims, ids).tolist():
-        views = len(np.unique(pose[used & (claims == name)]))
+def not_found(recording: Recording, ids: Ints, used: Bools) -> dict[int, str]:
+    """Return why final ids are not in the map (ids, (o,)); ``used`` are keyframes' boxes."""
+    given, pose = recording.detections.object_id, recording.detections.pose
+    reasons: dict[int, str] = {}
+    for name in np.setdiff1d(given, ids).tolist():
+        views = len(np.unique(pose[used & (given == name)]))
         reasons[name] = (
-            f"seen from {views} viewpoints, {FEWEST_VIEWS} are needed"
-            if views < FEWEST_VIEWS
+            f"seen from {views} viewpoints, {MIN_VIEWS} are needed"
+            if views < MIN_VIEWS
             else "no place explains its boxes, or they leave its distance open"
         )
     return reasons
 
 
 def _with_all_images(
-    scene: SceneMap,
-    recording: Recording,
-    keyframes: NDArray[np.int64],
-    tracklet: NDArray[np.int64],
-    used: NDArray[np.bool_],
+    scene: SceneMap, recording: Recording, keyframes: Ints, tracklets: Ints, used: Bools
 ) -> SceneMap:
     """Return the map with the poses and boxes between the keyframes."""
-    everything = SceneMap(
-        recording,
-        _cut_alike(tracklet, recording.detections.pose, used, scene.tracklet),
-        box_noise=scene.box_noise,
-        size_prior=scene.size_prior,
-    )
+    cut = _cut_alike(tracklets, recording.detections.pose, used, scene.labels.tracklets)
+    labels = Labels.of(recording.detections, cut)
+    labels.votes = scene.labels.votes.copy()
+    labels.object_of_tracklet = scene.labels.object_of_tracklet.copy()
+    everything = SceneMap(recording, labels, box_noise=scene.box_noise, size_prior=scene.size_prior)
     everything.poses = fill_in(recording, keyframes, scene.poses)
     everything.ellipsoids = scene.ellipsoids
-    everything.votes = scene.votes.copy()
-    everything.object_of_tracklet = dict(scene.object_of_tracklet)
     return everything
 
 
-def _cut_alike(
-    tracklet: NDArray[np.int64],
-    pose: NDArray[np.int64],
-    used: NDArray[np.bool_],
-    cut: NDArray[np.int64],
-) -> NDArray[np.int64]:
+def _cut_alike(tracklet: Ints, pose: Ints, used: Bools, cut: Ints) -> Ints:
     """Cut tracklets (m,) at the poses where those of the used boxes (u,) were cut."""
     result = tracklet.copy()
     known_pose = pose[used]
@@ -176,9 +165,7 @@ def _cut_alike(
     return result
 
 
-def _numbered(
-    box_object: NDArray[np.int64], count: int
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _numbered(box_object: Ints, count: int) -> tuple[Ints, Ints]:
     """Return ids by order of first boxes: of boxes (m,), and of rows (count,); -1 for none."""
     rows, first = np.unique(box_object[box_object >= 0], return_index=True)
     ids = np.full(count + 1, -1)

@@ -5,93 +5,107 @@ from __future__ import annotations
 from collections.abc import Collection
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dqslam._checks import Floats
+from dqslam._ids import ObjectRow
 from dqslam.association.scene_map import SceneMap
 from dqslam.assumptions.traffic import usual_size
 
-# 99 % of chi-square with 3 degrees of freedom.
-SAME_PLACE = 11.34
+# Two objects are one if the chi-square of their distance is below this: 99 %, 3 dof.
+DUPLICATE_MAX_CHI2 = 11.34
 # Fitted centers of one box-shaped object, seen from two sides, differ by this part of its size.
-SIDES = 0.3
-# Share of the images of the rarer of two objects that may show both, by mistake.
-SEEN_TOGETHER = 0.1
-# Objects of a class, before it has a usual size.
-ENOUGH = 5
-# Logarithms of sizes within a class spread by at least this, and seldom by three times as much.
-LEAST_SPREAD = 0.15
-UNUSUAL = 3.0
-# Of the logarithm of a size that is known beforehand: less than half, or twice, is another thing.
-NOT_HALF = 0.5
+DUPLICATE_CENTER_SIGMA = 0.3
+# Only centers nearer than so many times the sum of their sizes are compared: it costs a covariance.
+DUPLICATE_MAX_SIZES_APART = 4.0
+# Two boxes on one thing are a detector's mistake in at most this share of the rarer one's images.
+DUPLICATE_MAX_SEEN_TOGETHER = 0.1
 
-# Of chi-square with 4 degrees of freedom.
+# A class has a usual size once it has so many objects: of fewer, half may be wrong.
+MISFIT_MIN_OBJECTS = 5
+# Logarithms of sizes within a class spread by at least this; a few that agree show less by chance.
+MISFIT_MIN_SPREAD = 0.15
+# An object further off the usual log size, in spreads, is left out.
+MISFIT_MAX_SPREADS = 3.0
+# Of traffic the usual log size is learned from objects that are off the known one by less: what
+# moves towards us looks half as large, which is off by 0.69.
+MISFIT_MAX_OFF_KNOWN = 0.5
+
+# An object moved when no place explains its boxes from a path that is not bent to them: median
+# chi-square above 99 % of chance, 4 dof ...
+MOVER_MIN_CHI2 = 13.28
+# ... and the path is bent to them: that costs so many chi-squares a box, and so many times as much
+# as boxes usually have.
+MOVER_MIN_COST_PER_BOX = 2.0
+MOVER_MIN_COST_RATIO = 2.0
+# A median of fewer boxes says nothing.
+MOVER_MIN_BOXES = 8
+# The path hardly changes any more after so many iterations without an object.
+MOVER_MAX_ITERATIONS = 8
+# Median of chi-square with 4 degrees of freedom: how well the boxes of an object at rest fit.
 MEDIAN_CHI2 = 3.36
-# An object moved when without it the path explains its boxes worse than this, and with it pays
-# this much: chi-squares a box, and as a multiple of what is usual.
-BENT = 13.28
-PAID = 2.0
-PAID_MORE = 2.0
-LEAST_BOXES = 8
-# Share of the boxes of an id that one place explains, at least.
-LEAST_FIT = 0.5
-LEAVE_ONE_OUT_ITERATIONS = 8
+
+# An id names one thing if one place explains at least half of its boxes.
+SCATTERED_MAX_SHARE = 0.5
 
 
 def join_duplicates(scene: SceneMap) -> None:
     """Join objects of one class that may be in one place and are never seen together."""
+    labels = scene.labels
     pairs = close_pairs(scene)
     if not pairs:
         return
-    involved = np.unique(pairs)
-    involved, covariance = scene.joint_covariance(len(scene.poses) - 1, involved)
+    involved, covariance = scene.joint_covariance(len(scene.poses) - 1, np.unique(pairs))
     k = len(covariance) - 9 * len(involved)
+    place = {row: k + 9 * number for number, row in enumerate(involved.tolist())}
     size = np.exp(scene.log_sizes())
     for kept, given_up in pairs:
-        if not np.all(np.isin([kept, given_up], involved)):
+        if kept not in place or given_up not in place:
             continue
-        if scene.box_counts[kept] == 0 or scene.box_counts[given_up] == 0:
+        if labels.box_counts[kept] == 0 or labels.box_counts[given_up] == 0:
             continue
         if _are_seen_together(scene, kept, given_up):  # since one of them was joined with a third
             continue
-        a, b = (k + 9 * np.searchsorted(involved, [kept, given_up])).tolist()
-        spread = _of_difference(covariance, a, b)
-        spread = spread + (SIDES * min(size[kept], size[given_up])) ** 2 * np.eye(3)
+        spread = _covariance_of_difference(covariance, place[kept], place[given_up])
+        sigma = DUPLICATE_CENTER_SIGMA * min(size[kept], size[given_up])
+        spread = spread + sigma**2 * np.eye(3)
         apart = scene.ellipsoids[kept, :3] - scene.ellipsoids[given_up, :3]
-        if apart @ np.linalg.solve(spread, apart) <= SAME_PLACE:
-            scene.join_objects(kept, given_up)
+        if apart @ np.linalg.solve(spread, apart) <= DUPLICATE_MAX_CHI2:
+            labels.join_objects(kept, given_up)
 
 
-def close_pairs(scene: SceneMap) -> list[tuple[int, int]]:
+def close_pairs(scene: SceneMap) -> list[tuple[ObjectRow, ObjectRow]]:
     """Return pairs of one class, a few sizes apart at most, that are not seen together."""
-    alive = np.flatnonzero(scene.box_counts > 0)
-    alive = alive[~np.isin(alive, list(scene.left_out))]
+    labels = scene.labels
+    alive = np.flatnonzero(labels.box_counts > 0)
+    alive = alive[labels.takes_part[alive]]
     if len(alive) < 2:
         return []
     size = np.exp(scene.log_sizes()[alive])
     center = scene.ellipsoids[alive, :3]
-    called = scene.votes[alive].argmax(axis=1)
+    called = labels.votes[alive].argmax(axis=1)
     distance = np.linalg.norm(center[:, None] - center, axis=2)
-    near = (distance < 4 * (size[:, None] + size)) & (called[:, None] == called)
-    pairs = [(int(alive[i]), int(alive[j])) for i, j in np.argwhere(np.triu(near, 1))]
-    return [pair for pair in pairs if not _are_seen_together(scene, *pair)]
+    near = distance < DUPLICATE_MAX_SIZES_APART * (size[:, None] + size)
+    near &= called[:, None] == called
+    pairs = alive[np.argwhere(np.triu(near, 1))].tolist()
+    return [(a, b) for a, b in pairs if not _are_seen_together(scene, a, b)]
 
 
-def _are_seen_together(scene: SceneMap, a: int, b: int) -> bool:
+def _are_seen_together(scene: SceneMap, a: ObjectRow, b: ObjectRow) -> bool:
     """Tell whether images show both of two objects, more of them than by mistake."""
     pose = scene.recording.detections.pose
-    first, second = (pose[scene.box_object == number] for number in (a, b))
+    first, second = (pose[scene.labels.object_rows == row] for row in (a, b))
     together = len(np.intersect1d(first, second))
-    return together > SEEN_TOGETHER * min(len(first), len(second))
+    return together > DUPLICATE_MAX_SEEN_TOGETHER * min(len(first), len(second))
 
 
-def _of_difference(covariance: NDArray[np.float64], a: int, b: int) -> NDArray[np.float64]:
+def _covariance_of_difference(covariance: Floats, a: int, b: int) -> Floats:
     """Return the covariance of the difference of two points, at rows a and b of a joint one."""
     first, second = slice(a, a + 3), slice(b, b + 3)
     cross = covariance[first, second]
     return np.asarray(covariance[first, first] + covariance[second, second] - cross - cross.T)
 
 
-def _usual(values: NDArray[np.float64]) -> tuple[float, float]:
+def _shortest_half(values: Floats) -> tuple[float, float]:
     """Return the middle of the shortest half of some numbers, and a standard deviation from it.
 
     Nearly half of them may be wrong (Rousseeuw & Leroy 1987: the shorth).
@@ -103,7 +117,7 @@ def _usual(values: NDArray[np.float64]) -> tuple[float, float]:
     return 0.5 * (low + high), 0.5 * (high - low) / 0.6745
 
 
-def find_misfits(scene: SceneMap) -> dict[int, str]:
+def find_misfits(scene: SceneMap) -> dict[ObjectRow, str]:
     """Return objects whose size is unusual for their class, and how.
 
     What moves along a straight line while the camera does looks like a thing at rest, at another
@@ -111,46 +125,48 @@ def find_misfits(scene: SceneMap) -> dict[int, str]:
     learned from the objects of a class, of traffic from those that are not half as large as they
     should be: there, most may move.
     """
-    alive = np.flatnonzero(scene.box_counts > 0)
+    alive = np.flatnonzero(scene.labels.box_counts > 0)
     log_size = scene.log_sizes()
-    called = scene.votes.argmax(axis=1)
-    misfits = {}
-    for one in np.unique(called[alive]):
+    called = scene.labels.votes.argmax(axis=1)
+    misfits: dict[ObjectRow, str] = {}
+    for one in np.unique(called[alive]).tolist():
         members = alive[called[alive] == one]
-        name = scene.recording.detections.class_names[int(scene.classes[one])]
+        name = scene.class_names[one]
         likely = log_size[members]
         known = usual_size(name)
         if known is not None:
-            likely = likely[np.abs(likely - known) < NOT_HALF]
-        if len(likely) < ENOUGH:
+            likely = likely[np.abs(likely - known) < MISFIT_MAX_OFF_KNOWN]
+        if len(likely) < MISFIT_MIN_OBJECTS:
             continue
-        usual, spread = _usual(likely)
-        for number in members.tolist():
-            ratio = log_size[number] - usual
-            if abs(ratio) > UNUSUAL * max(spread, LEAST_SPREAD):
-                misfits[number] = (
+        usual, spread = _shortest_half(likely)
+        for row in members.tolist():
+            ratio = log_size[row] - usual
+            if abs(ratio) > MISFIT_MAX_SPREADS * max(spread, MISFIT_MIN_SPREAD):
+                misfits[row] = (
                     f"its size is {np.exp(ratio):.2g} times the usual one of a {name}: "
                     "it moved while it was seen, or is something else"
                 )
     return misfits
 
 
-def find_scattered(scene: SceneMap) -> dict[int, str]:
+def find_scattered(scene: SceneMap) -> dict[ObjectRow, str]:
     """Return objects that do not explain most boxes of their own tracklets."""
-    owner = np.array([scene.object_of_tracklet.get(int(t), -1) for t in scene.tracklet])
+    labels = scene.labels
     seen = scene.recording.detections.pose < len(scene.poses)
-    scattered = {}
-    shown, counts = np.unique(scene.box_object[scene.box_object >= 0], return_counts=True)
-    for number, count in zip(shown.tolist(), counts.tolist(), strict=True):
-        share = count / np.sum(seen & (owner == number))
-        if share < LEAST_FIT:
-            scattered[number] = (
+    owner = labels.object_of_tracklet[labels.tracklets[seen]]
+    scattered: dict[ObjectRow, str] = {}
+    for row in labels.shown_objects.tolist():
+        share = np.sum(labels.object_rows == row) / np.sum(owner == row)
+        if share < SCATTERED_MAX_SHARE:
+            scattered[row] = (
                 f"one place explains {share:.0%} of its boxes: it moved, or its id names several"
             )
     return scattered
 
 
-def find_movers(scene: SceneMap, suspects: Collection[int] | None = None) -> dict[int, str]:
+def find_movers(
+    scene: SceneMap, suspects: Collection[ObjectRow] | None = None
+) -> dict[ObjectRow, str]:
     """Return objects, all or some ``suspects``, that are at rest only if the path bends to them.
 
     Each in turn is left out of the estimate. If it moved, its boxes do not fit any place then, and
@@ -158,43 +174,49 @@ def find_movers(scene: SceneMap, suspects: Collection[int] | None = None) -> dic
     rest may look the same as long as one that moved bends the path: the worst comes first, and the
     others are tried again without it.
     """
-    part, counts = np.unique(scene.box_object[scene.box_object >= 0], return_counts=True)
-    takes_part = ~np.isin(part, list(scene.left_out))
-    if takes_part.sum() < 2:  # nothing else tells the path
+    labels = scene.labels
+    shown = labels.shown_objects
+    shown = shown[labels.takes_part[shown]]
+    if len(shown) < 2:  # nothing else tells the path
         return {}
-    asked = np.ones(len(part), dtype=bool) if suspects is None else np.isin(part, list(suspects))
-    alive = part[takes_part & asked & (counts >= LEAST_BOXES)].tolist()
-    fits = _fits_without(scene, alive, movers={}) if alive else {}
-    movers: dict[int, str] = {}
-    for number in sorted(fits, key=lambda one: -fits[one]):
-        fit = _fits_without(scene, [number], movers).get(number) if movers else fits[number]
+    asked = [
+        row
+        for row in shown.tolist()
+        if (suspects is None or row in suspects)
+        and np.sum(labels.object_rows == row) >= MOVER_MIN_BOXES
+    ]
+    fits = _fits_without(scene, asked, movers={}) if asked else {}
+    movers: dict[ObjectRow, str] = {}
+    for row in sorted(fits, key=lambda one: -fits[one]):
+        fit = _fits_without(scene, [row], movers).get(row) if movers else fits[row]
         if fit is not None:
-            movers[number] = (
+            movers[row] = (
                 "without it, the path explains its boxes "
                 f"{fit / MEDIAN_CHI2:.0f} times worse than chance: it moved"
             )
     return movers
 
 
-def _fits_without(scene: SceneMap, objects: list[int], movers: dict[int, str]) -> dict[int, float]:
+def _fits_without(
+    scene: SceneMap, object_rows: list[ObjectRow], movers: dict[ObjectRow, str]
+) -> dict[ObjectRow, float]:
     """Return those of some objects that bend the path, and how their boxes fit if they may not.
 
     The median chi-square of an object's boxes at one place, movers taking no part.
     """
-    fits = {}
-    claimed = np.flatnonzero(scene.box_object >= 0)
-    chi2 = scene.chi2(claimed, scene.ellipsoids[scene.box_object[claimed]], blur=0.0)
-    least = max(PAID, PAID_MORE * float(np.median(chi2)))
-    with_all = scene.cost(max_iterations=LEAVE_ONE_OUT_ITERATIONS, without=movers)
-    for number in objects:
-        rows = np.flatnonzero(scene.box_object == number)
-        without = scene.cost(max_iterations=LEAVE_ONE_OUT_ITERATIONS, without=[*movers, number])
-        paid = 2.0 * (with_all.cost - without.cost) / len(rows)
-        if paid < least:
+    fits: dict[ObjectRow, float] = {}
+    shown = scene.labels.object_rows
+    given = np.flatnonzero(shown >= 0)
+    usual = float(np.median(scene.chi2(given, scene.ellipsoids[shown[given]])))
+    least = max(MOVER_MIN_COST_PER_BOX, MOVER_MIN_COST_RATIO * usual)
+    with_all, _ = scene.solve_without(movers, max_iterations=MOVER_MAX_ITERATIONS)
+    for row in object_rows:
+        rows = np.flatnonzero(shown == row)
+        without, poses = scene.solve_without([*movers, row], max_iterations=MOVER_MAX_ITERATIONS)
+        if 2.0 * (with_all - without) / len(rows) < least:
             continue
-        with scene.at(without.poses):
-            ellipsoids, _ = scene.fit_groups([rows])
-            fit = scene.chi2(rows, np.tile(ellipsoids, (len(rows), 1)), blur=0.0)
-        if np.median(fit) > BENT:
-            fits[number] = float(np.median(fit))
+        ellipsoids, _ = scene.fit_groups([rows], poses)
+        fit = scene.chi2(rows, np.repeat(ellipsoids, len(rows), axis=0), poses=poses)
+        if np.median(fit) > MOVER_MIN_CHI2:
+            fits[row] = float(np.median(fit))
     return fits

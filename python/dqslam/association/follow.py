@@ -5,75 +5,75 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dqslam import _core
+from dqslam._checks import Floats, Ints
+from dqslam._ids import Tracklet
 from dqslam.association.assignment import assign
 from dqslam.association.consistency import find_misfits, join_duplicates
-from dqslam.association.gating import (
-    CHI2_GATE,
-    PredictedBoxes,
-    in_image,
-    pair_costs,
-    predict_boxes,
-)
-from dqslam.association.initiation import FEWEST_VIEWS, propose_groups
+from dqslam.association.gating import CHI2_GATE, PredictedBoxes, in_image, pair_costs, predict_boxes
+from dqslam.association.initiation import MIN_VIEWS, propose_groups
 from dqslam.association.scene_map import SceneMap
 from dqslam.association.thinning import transport
 from dqslam.recording import Recording
 
-# -2 ln of the odds, 20 to 1: what is less clear waits.
-AMBIGUOUS = 6.0
-# Images in a row in which a tracklet does not fit its object, before it is taken for another.
-STRIKES = 3
-# A path is followed in at most this many parts, of at least so many poses.
-PARTS = 60
-SHORTEST_PART = 3
-# Poses before the level of the odometry's noise can be told, and parts between two estimates.
-FIRST_NOISE = 10
-NOISE_EVERY = 3
-MAX_ITERATIONS = 12
-# Boxes of a new object that fit, and how well its distance is known.
-LEAST_FIT = 0.6
-LARGEST_DEPTH_ERROR = 0.3
+# A box waits unless its choice is better than all others by this: -2 ln of the odds, 20 to 1.
+MIN_MARGIN_AHEAD = 6.0
+# A tracklet that does not fit its object in so many images in a row has gone over to another.
+MISFITS_TO_CUT_TRACKLET = 3
+# A path is followed in at most so many parts, an estimate each, of at least so many poses.
+MAX_PARTS = 60
+MIN_POSES_PER_PART = 3
+# The level of the odometry's noise is estimated from so many poses on, after every third part:
+# fewer residuals say little, and an estimate of the level costs as much as one of the path.
+MIN_POSES_FOR_NOISE = 10
+PARTS_PER_NOISE_ESTIMATE = 3
+# Iterations of the estimate after each part: the next part goes on from there.
+MAX_ITERATIONS_PER_PART = 12
+# A group of boxes starts an object if one place explains this share of them ...
+INITIATION_MIN_FIT = 0.6
+# ... and its distance is known: relative standard deviation.
+INITIATION_MAX_DEPTH_ERROR = 0.3
+# A group that was refused is tried again once it has grown by this factor.
+INITIATION_RETRY_GROWTH = 1.25
 
 
 class Follower:
-    """Follows a path part by part."""
+    """Follows a path, and keeps what went wrong on the way."""
 
-    def __init__(self, scene: SceneMap, *, trust: float) -> None:
+    def __init__(self, *, trust: float) -> None:
         """``trust`` is the probability that a tracklet stays with its object, 1 if that is sure."""
-        self.scene = scene
         self.final = trust == 1.0
-        self.bonus = np.inf if self.final else 2.0 * float(np.log(trust / (1.0 - trust)))
-        self._strikes: dict[int, int] = {}
-        self._failed: dict[tuple[int, ...], int] = {}
+        self.switch_cost = np.inf if self.final else 2.0 * float(np.log(trust / (1.0 - trust)))
+        """What a box costs more with another object than that of its tracklet: -2 ln of odds."""
+        self._misfits: dict[Tracklet, int] = {}  # images in a row
+        self._refused: dict[tuple[int, ...], int] = {}  # by a group's first boxes: its size
 
-    def follow(self, progress: Callable[[float], None]) -> None:
+    def follow(self, scene: SceneMap, progress: Callable[[float], None]) -> None:
         """Go along the whole path; ``progress`` is told the share that is done."""
-        scene = self.scene
         end = len(scene.recording.timestamps)
-        size = max(SHORTEST_PART, -(-end // PARTS))
+        size = max(MIN_POSES_PER_PART, -(-end // MAX_PARTS))
         for part, begin in enumerate(range(1, end, size)):
-            self.assign_ahead(begin, min(begin + size, end))
-            self.give_birth()
-            scene.estimate(max_iterations=MAX_ITERATIONS)
-            if len(scene.poses) >= FIRST_NOISE and part % NOISE_EVERY == 0:
+            self.assign_ahead(scene, begin, min(begin + size, end))
+            self.initiate_objects(scene)
+            scene.estimate(max_iterations=MAX_ITERATIONS_PER_PART)
+            if len(scene.poses) >= MIN_POSES_FOR_NOISE and part % PARTS_PER_NOISE_ESTIMATE == 0:
                 scene.estimate_noise()
             if not self.final:
                 join_duplicates(scene)
-            scene.left_out = find_misfits(scene)
+            scene.labels.left_out = find_misfits(scene)
             progress(len(scene.poses) / end)
 
-    def assign_ahead(self, begin: int, end: int, *, strangers_only: bool = False) -> None:
+    def assign_ahead(
+        self, scene: SceneMap, begin: int, end: int, *, strangers_only: bool = False
+    ) -> None:
         """Go on by odometry to some poses, and give their boxes to the objects they clearly show.
 
         What is known of the path and the objects is that of the pose before ``begin``. Strangers
         are boxes that wait and whose tracklets have no object.
         """
-        scene = self.scene
         scene.extend(end)
-        known, covariance = scene.joint_covariance(begin - 1, self._in_view(begin, end))
+        known, covariance = scene.joint_covariance(begin - 1, _in_view(scene, begin, end))
         odometry = scene.recording.odometry
         k = odometry.covariance.shape[1]
         for pose in range(begin, end):
@@ -81,84 +81,84 @@ class Follower:
             covariance[:k] = moved @ covariance[:k]
             covariance[:, :k] = covariance[:, :k] @ moved.T
             covariance[:k, :k] += odometry.covariance[pose - 1]
-            self._assign(pose, known, covariance, strangers_only=strangers_only)
-
-    def _in_view(self, begin: int, end: int) -> NDArray[np.int64]:
-        """Return the objects that some of the poses should see; no other is predicted."""
-        scene = self.scene
-        known = np.flatnonzero(scene.box_counts > 0)
-        camera, model = scene.recording.camera, scene.recording.odometry.pose_model
-        shown = np.zeros(len(known), dtype=bool)
-        for pose in scene.poses[begin:end]:
-            shown |= in_image(camera, model, pose, scene.ellipsoids[known])
-        return known[shown]
+            self._assign(scene, pose, known, covariance, strangers_only=strangers_only)
 
     def _assign(
-        self,
-        pose: int,
-        known: NDArray[np.int64],
-        covariance: NDArray[np.float64],
-        *,
-        strangers_only: bool,
+        self, scene: SceneMap, pose: int, known: Ints, covariance: Floats, *, strangers_only: bool
     ) -> None:
-        scene = self.scene
+        """Give the boxes of a pose to some objects, whose covariance is joint with the pose's."""
+        labels = scene.labels
         rows = np.flatnonzero(scene.recording.detections.pose == pose)
         predicted = predict(scene, pose, known, covariance)
         if strangers_only:
-            predicted = predicted.without(np.isin(known, scene.box_object[rows]))
-            rows = rows[scene.are_strangers(rows)]
+            predicted = predicted.without(np.isin(known, labels.object_rows[rows]))
+            rows = rows[labels.are_strangers(rows)]
         if not rows.size or not len(predicted.box):
             return
-        choice, margin = choose(scene, rows, known, predicted, self.bonus)
-        for row, number, sure in zip(rows, choice.tolist(), margin, strict=True):
-            tracklet = int(scene.tracklet[row])
-            own = scene.object_of_tracklet.get(tracklet)
-            if own is not None and own != number:
+        choice, margin = choose(scene, rows, known, predicted, self.switch_cost)
+        for row, chosen, sure in zip(rows, choice, margin, strict=True):
+            tracklet = labels.tracklets[row]
+            own = labels.object_of_tracklet[tracklet]
+            if own >= 0 and own != chosen:
                 if not self.final:
-                    self._strike(tracklet, pose)
-            elif number >= 0 and (own is not None or sure >= AMBIGUOUS):
-                scene.claim(np.array([row]), np.array([number]))
-                scene.object_of_tracklet[tracklet] = number
-                self._strikes[tracklet] = 0
+                    self._count_misfit(scene, tracklet, pose)
+            elif chosen >= 0 and (own >= 0 or sure >= MIN_MARGIN_AHEAD):
+                labels.assign(np.array([row]), np.array([chosen]))
+                labels.object_of_tracklet[tracklet] = chosen
+                self._misfits[tracklet] = 0
 
-    def _strike(self, tracklet: int, pose: int) -> None:
-        """Count that a tracklet does not fit its object; in the end, cut it in two."""
-        self._strikes[tracklet] = self._strikes.get(tracklet, 0) + 1
-        if self._strikes[tracklet] >= STRIKES:
-            self.scene.cut_tracklet(tracklet, pose)
+    def _count_misfit(self, scene: SceneMap, tracklet: Tracklet, pose: int) -> None:
+        """Count that a tracklet does not fit its object at a pose; in the end, cut it in two."""
+        self._misfits[tracklet] = self._misfits.get(tracklet, 0) + 1
+        if self._misfits[tracklet] >= MISFITS_TO_CUT_TRACKLET:
+            late = scene.recording.detections.pose >= pose
+            scene.labels.cut_tracklet(np.flatnonzero(late & (scene.labels.tracklets == tracklet)))
 
-    def give_birth(self) -> None:
+    def initiate_objects(self, scene: SceneMap) -> None:
         """Start the objects that waiting boxes agree on."""
-        scene = self.scene
-        recording = scene.recording
+        recording, labels = scene.recording, scene.labels
         seen = np.flatnonzero(recording.detections.pose < len(scene.poses))
-        waiting = seen[scene.are_strangers(seen)]
+        waiting = seen[labels.are_strangers(seen)]
         if not waiting.size:
             return
         cameras = _core.world_from_camera(
             recording.odometry.pose_model, recording.camera, scene.poses
         )
-        groups = [
-            group
-            for group in propose_groups(
-                recording, cameras, waiting, scene.tracklet, tracklets_only=self.final
-            )
-            if len(group) > 1.25 * self._failed.get(tuple(scene.box_name[group[:3]]), 0)
-        ]
+        proposed = propose_groups(
+            recording, cameras, waiting, labels.tracklets, tracklets_only=self.final
+        )
+        names = [tuple(scene.observation_rows[group[:3]].tolist()) for group in proposed]
+        groups = {
+            name: group
+            for name, group in zip(names, proposed, strict=True)
+            if len(group) > INITIATION_RETRY_GROWTH * self._refused.get(name, 0)
+        }
         if not groups:
             return
-        ellipsoids, spread = scene.fit_groups(groups)
-        for group, ellipsoid, covariance in zip(groups, ellipsoids, spread, strict=True):
+        ellipsoids, spread = scene.fit_groups(list(groups.values()))
+        for (name, group), ellipsoid, covariance in zip(
+            groups.items(), ellipsoids, spread, strict=True
+        ):
             middle = cameras[recording.detections.pose[group], :3].mean(axis=0)
             towards = ellipsoid[:3] - middle
             blur = _blur(recording, float(np.linalg.norm(towards)))
-            chi2 = scene.chi2(group, np.tile(ellipsoid, (len(group), 1)), blur=blur)
+            chi2 = scene.chi2(group, np.repeat(ellipsoid[None], len(group), axis=0), blur=blur)
             fits = chi2 <= CHI2_GATE[4]
-            sure = _depth_error(towards, covariance) < LARGEST_DEPTH_ERROR
-            if sure and fits.sum() >= FEWEST_VIEWS and fits.mean() >= LEAST_FIT:
+            sure = _depth_error(towards, covariance) < INITIATION_MAX_DEPTH_ERROR
+            if sure and fits.sum() >= MIN_VIEWS and fits.mean() >= INITIATION_MIN_FIT:
                 scene.add_object(ellipsoid, group[fits])
             else:
-                self._failed[tuple(scene.box_name[group[:3]])] = len(group)
+                self._refused[name] = len(group)
+
+
+def _in_view(scene: SceneMap, begin: int, end: int) -> Ints:
+    """Return the objects that some of the poses should see; no other is predicted."""
+    known = np.flatnonzero(scene.labels.box_counts > 0)
+    camera, model = scene.recording.camera, scene.recording.odometry.pose_model
+    shown = np.zeros(len(known), dtype=bool)
+    for pose in scene.poses[begin:end]:
+        shown |= in_image(camera, model, pose, scene.ellipsoids[known])
+    return known[shown]
 
 
 def _blur(recording: Recording, distance: float) -> float:
@@ -168,7 +168,7 @@ def _blur(recording: Recording, distance: float) -> float:
     return recording.camera.fx * float(np.sqrt(turn))
 
 
-def _depth_error(towards: NDArray[np.float64], covariance: NDArray[np.float64]) -> float:
+def _depth_error(towards: Floats, covariance: Floats) -> float:
     """Return the relative standard deviation of a distance; infinite where it is unknown."""
     if not np.isfinite(covariance).all():
         return np.inf
@@ -176,43 +176,37 @@ def _depth_error(towards: NDArray[np.float64], covariance: NDArray[np.float64]) 
     return float(np.sqrt(max(variance, 0.0))) / float(towards @ towards)
 
 
-def predict(
-    scene: SceneMap, pose: int, objects: NDArray[np.int64], covariance: NDArray[np.float64]
-) -> PredictedBoxes:
-    """Return where objects are expected in the image of a pose, rows being those of ``objects``."""
+def predict(scene: SceneMap, pose: int, object_rows: Ints, covariance: Floats) -> PredictedBoxes:
+    """Return where objects are expected in the image of a pose, by places in ``object_rows``."""
     recording = scene.recording
     return predict_boxes(
         recording.camera,
         recording.odometry.pose_model,
         scene.poses[pose],
-        scene.ellipsoids[objects],
+        scene.ellipsoids[object_rows],
         covariance,
     )
 
 
 def choose(
-    scene: SceneMap,
-    rows: NDArray[np.int64],
-    objects: NDArray[np.int64],
-    predicted: PredictedBoxes,
-    bonus: float,
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    scene: SceneMap, rows: Ints, object_rows: Ints, predicted: PredictedBoxes, switch_cost: float
+) -> tuple[Ints, Floats]:
     """Assign the boxes of one image: the object of each (b,), -1 for none, and how sure (b,).
 
-    A box costs ``bonus`` more with another object than that of its tracklet.
+    A box costs ``switch_cost`` more with another object than that of its tracklet.
     """
-    detections = scene.recording.detections
-    shown = objects[predicted.object_row]
+    detections, labels = scene.recording.detections, scene.labels
+    shown = object_rows[predicted.object_row]
     costs = pair_costs(
         scene.recording.camera,
         predicted,
         detections.box[rows],
         scene.box_covariance[rows],
         detections.truncated[rows],
-        scene.class_probability(rows, shown),
+        labels.class_probability(rows, shown),
     )
-    own = np.array([scene.object_of_tracklet.get(int(t), -1) for t in scene.tracklet[rows]])
-    claimed = (own[:, None] >= 0) | np.isinf(bonus)
-    stranger = claimed & (own[:, None] != shown)
-    column, margin = assign(np.where(stranger, costs.cost + bonus, costs.cost), costs.null)
+    own = labels.object_of_tracklet[labels.tracklets[rows]]
+    may_switch = (own[:, None] < 0) & np.isfinite(switch_cost)
+    stranger = ~may_switch & (own[:, None] != shown)
+    column, margin = assign(np.where(stranger, costs.cost + switch_cost, costs.cost), costs.null)
     return np.where(column >= 0, np.append(shown, -1)[column], -1), margin

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from dqslam._checks import Ints
 
 
-def group_by_pose(pose: NDArray[np.int64]) -> list[tuple[int, NDArray[np.int64]]]:
+def group_by_pose(pose: Ints) -> list[tuple[int, Ints]]:
     """Return poses in order of time, each with the rows of its boxes; ``pose`` is theirs, (m,)."""
     order = np.argsort(pose, kind="stable")
     poses, starts = np.unique(pose[order], return_index=True)

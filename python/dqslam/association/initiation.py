@@ -5,30 +5,31 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dqslam._checks import Bools, Floats, Ints
 from dqslam.association.rays import Rays, cast_rays
 from dqslam.recording import Recording
 
-# Viewpoints of a new object, at least, and the angle between two of them [rad].
-FEWEST_VIEWS = 4
-LEAST_PARALLAX = 0.08
-# Boxes agree with a sphere when their middles lie within this part of their side ...
-MISS = 0.4
-# ... and their sides within this factor.
-FACTOR = 1.5
-# Boxes of one class that are compared with each other, the latest ones.
-LONGEST_WAIT = 60
+# An object starts from so many viewpoints: with three, boxes of different things meet by chance ...
+MIN_VIEWS = 4
+# ... of which two are this far apart [rad]: below, its distance is as good as unknown.
+MIN_PARALLAX = 0.08
+# Boxes agree with a sphere when their middles lie within this part of their side of its center ...
+MAX_CENTER_OFFSET = 0.4
+# ... and their sides are those of the sphere within this factor.
+MAX_SIDE_FACTOR = 1.5
+# So many boxes of one class are compared with each other, the latest ones: all pairs are.
+MAX_BOXES_COMPARED = 60
 
 
 def propose_groups(
     recording: Recording,
-    cameras: NDArray[np.float64],
-    rows: NDArray[np.int64],
-    tracklet: NDArray[np.int64],
+    cameras: Floats,
+    rows: Ints,
+    tracklet: Ints,
     *,
     tracklets_only: bool = False,
-) -> list[NDArray[np.int64]]:
+) -> list[Ints]:
     """Group waiting boxes: tracklets that are long enough, then boxes that meet in space.
 
     Parameters
@@ -48,41 +49,37 @@ def propose_groups(
     groups, rest = [], np.zeros(len(rows), dtype=bool)
     for one in np.unique(number):
         part = np.flatnonzero(number == one)
-        if len(np.unique(waiting.pose[part])) < FEWEST_VIEWS:
+        if len(np.unique(waiting.pose[part])) < MIN_VIEWS:
             rest[part] = True
-        elif parallax(rays, part) >= LEAST_PARALLAX:
+        elif parallax(rays, part) >= MIN_PARALLAX:
             groups.append(part)
     rest &= not tracklets_only
     for class_id in np.unique(waiting.class_id[rest]).tolist():
         part = np.flatnonzero(rest & (waiting.class_id == class_id))
-        part = part[np.argsort(waiting.pose[part], kind="stable")][-LONGEST_WAIT:]
+        part = part[np.argsort(waiting.pose[part], kind="stable")][-MAX_BOXES_COMPARED:]
         groups += _meeting(rays, waiting.pose, part)
     return [rows[group] for group in groups]
 
 
-def parallax(rays: Rays, rows: NDArray[np.int64]) -> float:
+def parallax(rays: Rays, rows: Ints) -> float:
     """Return the largest angle between two of some rays, radians."""
     cosine = rays.direction[rows] @ rays.direction[rows].T
     return float(np.arccos(np.clip(cosine.min(), -1.0, 1.0)))
 
 
-def _meeting(
-    rays: Rays, pose: NDArray[np.int64], rows: NDArray[np.int64]
-) -> list[NDArray[np.int64]]:
+def _meeting(rays: Rays, pose: Ints, rows: Ints) -> list[Ints]:
     """Group boxes by the spheres that most of them agree with, one box of each pose."""
-    groups: list[NDArray[np.int64]] = []
-    while len(np.unique(pose[rows])) >= FEWEST_VIEWS:
+    groups: list[Ints] = []
+    while len(np.unique(pose[rows])) >= MIN_VIEWS:
         group = rows[_largest_group(rays, pose, rows)]
-        if len(group) < FEWEST_VIEWS:
+        if len(group) < MIN_VIEWS:
             break
         groups.append(group)
         rows = np.setdiff1d(rows, group)
     return groups
 
 
-def _largest_group(
-    rays: Rays, pose: NDArray[np.int64], rows: NDArray[np.int64]
-) -> NDArray[np.bool_]:
+def _largest_group(rays: Rays, pose: Ints, rows: Ints) -> Bools:
     """Let each pair of rays propose a sphere, and tell which boxes agree with the best of them."""
     center, radius = _spheres(rays, pose, rows)
     if not len(center):
@@ -90,8 +87,9 @@ def _largest_group(
     towards = center[:, None] - rays.origin[rows]
     distance = np.linalg.norm(towards, axis=2)
     sine = np.linalg.norm(np.cross(towards / distance[..., None], rays.direction[rows]), axis=2)
-    miss = sine / (2 * rays.half_width[rows]) / MISS
-    factor = np.abs(np.log(radius[:, None] / distance / rays.half_width[rows])) / np.log(FACTOR)
+    miss = sine / (2 * rays.half_width[rows]) / MAX_CENTER_OFFSET
+    ratio = radius[:, None] / distance / rays.half_width[rows]
+    factor = np.abs(np.log(ratio)) / np.log(MAX_SIDE_FACTOR)
     ahead = np.sum(towards * rays.direction[rows], axis=2) > 0
     badness = np.where(ahead & (miss < 1) & (factor < 1), miss + factor, np.inf)
     # One box of each pose, the nearest.
@@ -105,9 +103,7 @@ def _largest_group(
     return np.asarray(agrees[np.argmax(score)])
 
 
-def _spheres(
-    rays: Rays, pose: NDArray[np.int64], rows: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _spheres(rays: Rays, pose: Ints, rows: Ints) -> tuple[Floats, Floats]:
     """Return centers (s, 3) and radii (s,) where two rays from different poses meet in front."""
     i, j = np.triu_indices(len(rows), 1)
     i, j = rows[i], rows[j]
@@ -118,7 +114,7 @@ def _spheres(
     along_j = np.sum(base * rays.direction[j], axis=1)
     depth_i = (along_i - cosine * along_j) / squared_sine
     depth_j = (cosine * along_i - along_j) / squared_sine
-    good = (pose[i] != pose[j]) & (squared_sine > np.sin(LEAST_PARALLAX) ** 2)
+    good = (pose[i] != pose[j]) & (squared_sine > np.sin(MIN_PARALLAX) ** 2)
     good &= (depth_i > 0) & (depth_j > 0)
     i, j, depth_i, depth_j = i[good], j[good], depth_i[good, None], depth_j[good, None]
     on_i = rays.origin[i] + rays.direction[i] * depth_i

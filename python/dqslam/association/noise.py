@@ -10,9 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dqslam import _core
+from dqslam._checks import Floats, Ints
 from dqslam.association.thinning import compose_covariance
 from dqslam.assumptions import OdometryNoise
 from dqslam.recording import Recording
@@ -26,22 +26,22 @@ _LEAST = 1e-6
 class StepNoise:
     """Covariance of the motion between keyframes, as a sum of two unknown levels."""
 
-    per_translation: NDArray[np.float64]
+    per_translation: Floats
     """For a sigma of 1 m a step, shape (n - 1, k, k)."""
-    per_rotation: NDArray[np.float64]
+    per_rotation: Floats
     """For a sigma of 1 rad a step, shape (n - 1, k, k)."""
 
     @classmethod
-    def between(cls, recording: Recording, keyframes: NDArray[np.int64]) -> StepNoise:
+    def between(cls, recording: Recording, keyframes: Ints) -> StepNoise:
         """Carry the noise of single steps on to the keyframes."""
         steps, k, _ = recording.odometry.covariance.shape
-        translation = np.arange(k) < _axes(k)
+        translation = np.arange(k) < translation_axes(k)
         units = (
             np.tile(np.diag(part * 1.0), (steps, 1, 1)) for part in (translation, ~translation)
         )
         return cls(*(compose_covariance(recording, unit, keyframes) for unit in units))
 
-    def covariance(self, noise: OdometryNoise) -> NDArray[np.float64]:
+    def covariance(self, noise: OdometryNoise) -> Floats:
         """Return the covariances for a level of the noise, shape (n - 1, k, k)."""
         return np.asarray(
             noise.translation_m**2 * self.per_translation
@@ -49,7 +49,7 @@ class StepNoise:
         )
 
 
-def _axes(k: int) -> int:
+def translation_axes(k: int) -> int:
     """Return how many of the k numbers of a tangent are a translation: 2 of 3, or 3 of 6."""
     return k // 2 + k % 2
 
@@ -59,8 +59,8 @@ def corrected(noise: OdometryNoise, fit: _core.Fit) -> OdometryNoise:
     k = fit.odometry_residuals.shape[1]
     better = []
     for value, part in (
-        (noise.translation_m, slice(0, _axes(k))),
-        (noise.rotation_rad, slice(_axes(k), k)),
+        (noise.translation_m, slice(0, translation_axes(k))),
+        (noise.rotation_rad, slice(translation_axes(k), k)),
     ):
         squares = np.sum(fit.odometry_residuals[:, part] ** 2)
         redundancy = np.sum(1.0 - fit.odometry_leverage[:, part])

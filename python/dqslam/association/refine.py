@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dqslam import _core
+from dqslam._checks import Ints
+from dqslam._ids import ObjectRow
 from dqslam.association.consistency import (
     find_misfits,
     find_movers,
@@ -16,33 +17,38 @@ from dqslam.association.consistency import (
 )
 from dqslam.association.follow import Follower, choose, predict
 from dqslam.association.images import group_by_pose
-from dqslam.association.initiation import FEWEST_VIEWS
+from dqslam.association.initiation import MIN_VIEWS
 from dqslam.association.scene_map import SceneMap
 
+# Rounds of estimating, assigning and judging: after the third hardly a box changes.
 ROUNDS = 3
+# Iterations of an estimate of the whole path; it stops where the cost does.
 MAX_ITERATIONS = 50
-# The noise is settled when its level changes by less, as a logarithm, or after so many times.
-SETTLED = 0.05
-MOST_CORRECTIONS = 6
-# -2 ln of the odds, 3 to 1: with the whole path known, waiting helps no more.
-AMBIGUOUS = 2.0
+# The level of the noise is settled when it changes by less, as a logarithm ...
+NOISE_MAX_CHANGE = 0.05
+# ... or was corrected so many times.
+MAX_NOISE_CORRECTIONS = 6
+# A box waits unless its choice is better than all others by this: -2 ln of the odds, 3 to 1. With
+# the whole path known, waiting helps no more.
+MIN_MARGIN_AFTERWARDS = 2.0
 
 
-def refine(follower: Follower, progress: Callable[[float], None]) -> None:
+def refine(
+    scene: SceneMap, follower: Follower, progress: Callable[[float], None] = lambda share: None
+) -> None:
     """Make the map agree with itself; ``progress`` is told the share that is done."""
-    scene = follower.scene
+    labels = scene.labels
     for done in range(ROUNDS):
         settle(scene)
-        reassign(scene, follower.bonus)
-        for number in np.flatnonzero(scene.box_counts < FEWEST_VIEWS).tolist():
-            scene.give_up(number)
-        follower.give_birth()
+        reassign(scene, follower.switch_cost)
+        labels.give_up(np.flatnonzero(labels.box_counts < MIN_VIEWS))
+        follower.initiate_objects(scene)
         if not follower.final:
             join_duplicates(scene)
-        scene.left_out = find_misfits(scene)
-        scene.left_out |= find_movers(scene)
+        labels.left_out = find_misfits(scene)
+        labels.left_out |= find_movers(scene)
         if follower.final:
-            scene.left_out |= find_scattered(scene)
+            labels.left_out |= find_scattered(scene)
         progress((done + 1) / ROUNDS)
     settle(scene)
     if follower.final and scene.mode == _core.Mode.SLAM:
@@ -57,66 +63,63 @@ def try_refused(scene: SceneMap) -> None:
     say which object a box shows: all take part once, under a robust loss, those of objects that
     were left out as well.
     """
-    refused = np.flatnonzero(scene.box_object < 0)
-    own = [scene.object_of_tracklet.get(int(one), -1) for one in scene.tracklet[refused]]
-    scene.claim(refused, np.array(own, dtype=np.int64))
-    scene.left_out = {}
+    labels = scene.labels
+    refused = np.flatnonzero(labels.object_rows < 0)
+    labels.assign(refused, labels.object_of_tracklet[labels.tracklets[refused]])
+    labels.left_out = {}
     settle(scene)
     reassign(scene, np.inf)
-    scene.left_out = _find_few(scene)
-    scene.left_out |= find_misfits(scene)
-    scene.left_out |= find_movers(scene)
-    scene.left_out |= find_scattered(scene)
+    labels.left_out = _find_few(scene)
+    labels.left_out |= find_misfits(scene)
+    labels.left_out |= find_movers(scene)
+    labels.left_out |= find_scattered(scene)
     settle(scene)
 
 
-def _find_few(scene: SceneMap) -> dict[int, str]:
+def _find_few(scene: SceneMap) -> dict[ObjectRow, str]:
     """Return objects that too few boxes are left of."""
-    counts = scene.box_counts
+    counts = scene.labels.box_counts
     return {
-        row: f"one place explains {counts[row]} of its boxes, {FEWEST_VIEWS} are needed"
-        for row in np.flatnonzero((counts > 0) & (counts < FEWEST_VIEWS)).tolist()
+        ObjectRow(row): f"one place explains {count} of its boxes, {MIN_VIEWS} are needed"
+        for row, count in enumerate(counts.tolist())
+        if 0 < count < MIN_VIEWS
     }
 
 
 def settle(scene: SceneMap) -> None:
     """Estimate, and correct the level of the odometry's noise, until that changes no more."""
-    for _ in range(MOST_CORRECTIONS):
+    for _ in range(MAX_NOISE_CORRECTIONS):
         scene.estimate(max_iterations=MAX_ITERATIONS)
-        if scene.estimate_noise() < SETTLED:
+        if scene.estimate_noise() < NOISE_MAX_CHANGE:
             break
 
 
-def reassign(scene: SceneMap, bonus: float) -> None:
+def reassign(scene: SceneMap, switch_cost: float) -> None:
     """Assign all boxes again, those that waited too, each image by itself."""
-    detections = scene.recording.detections
-    alive = np.flatnonzero(scene.box_counts > 0)
-    found = np.full(len(detections), -1)
-    for pose, rows in group_by_pose(detections.pose):
-        found[rows] = assign_afterwards(scene, pose, rows, alive, bonus)
-    scene.release_all()
-    scene.claim(np.arange(len(found)), found)
-    claimed = np.flatnonzero(found >= 0)
+    labels = scene.labels
+    alive = np.flatnonzero(labels.box_counts > 0)
+    found = np.full(len(labels.tracklets), -1)
+    for pose, rows in group_by_pose(scene.recording.detections.pose):
+        found[rows] = assign_afterwards(scene, pose, rows, alive, switch_cost)
+    labels.release_all()
+    labels.assign(np.arange(len(found)), found)
+    shown = np.flatnonzero(found >= 0)
     pairs, counts = np.unique(
-        np.column_stack([scene.tracklet[claimed], found[claimed]]), axis=0, return_counts=True
+        np.column_stack([labels.tracklets[shown], found[shown]]), axis=0, return_counts=True
     )
-    for row in np.argsort(counts, kind="stable"):  # the most frequent comes last, and stays
-        scene.object_of_tracklet[int(pairs[row, 0])] = int(pairs[row, 1])
+    pairs = pairs[np.argsort(counts, kind="stable")]  # the most frequent comes last, and stays
+    labels.object_of_tracklet[pairs[:, 0]] = pairs[:, 1]
 
 
 def assign_afterwards(
-    scene: SceneMap,
-    pose: int,
-    rows: NDArray[np.int64],
-    objects: NDArray[np.int64],
-    bonus: float,
-) -> NDArray[np.int64]:
+    scene: SceneMap, pose: int, rows: Ints, object_rows: Ints, switch_cost: float
+) -> Ints:
     """Return the objects that the boxes of an image show, -1 for none, shape (b,).
 
     The path and the objects have been fitted to these very boxes: they count as certain.
     """
     k = scene.recording.odometry.covariance.shape[1]
-    certain = np.zeros((k + 9 * len(objects),) * 2)
-    predicted = predict(scene, pose, objects, certain)
-    choice, margin = choose(scene, rows, objects, predicted, bonus)
-    return np.where(margin >= AMBIGUOUS, choice, -1)
+    certain = np.zeros((k + 9 * len(object_rows),) * 2)
+    predicted = predict(scene, pose, object_rows, certain)
+    choice, margin = choose(scene, rows, object_rows, predicted, switch_cost)
+    return np.where(margin >= MIN_MARGIN_AFTERWARDS, choice, -1)

@@ -8,46 +8,41 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dqslam import _core
+from dqslam._checks import Bools, Floats, Ints
+from dqslam._ids import Tracklet
 from dqslam.association.images import group_by_pose
 from dqslam.association.rays import cameras_by_odometry, points_at_depth_one
 from dqslam.metrics import box_iou
 from dqslam.recording import Recording
 
-# A box overlaps the place predicted for it by at least this (intersection over union).
-LEAST_OVERLAP = 0.3
-# Without overlap: this many box sides away, by this factor larger or smaller, and nothing else of
-# its class twice as far around.
-FARTHEST_SIDES = 1.0
-LARGEST_GROWTH = 1.6
-# A tracked object is seen again within so many images, or taken for lost.
-LONGEST_GAP = 5
+# A box overlaps the place predicted for it by at least this, as intersection over union ...
+MIN_OVERLAP = 0.3
+# ... or its middle is so many box sides away at most, with nothing else of its class twice as far
+# around, and it is by this factor larger or smaller at most.
+MAX_SIDES_AWAY = 1.0
+MAX_GROWTH = 1.6
+# A track that is not seen again within so many images is lost: its prediction is worth nothing.
+MAX_IMAGES_UNSEEN = 5
 
 
 @dataclass
 class _Track:
     """What is known of a tracklet when the next image comes."""
 
-    number: int
+    number: Tracklet
     class_id: int
-    claim: int
+    tracker_id: int
     """Id that a tracker gave, -1 for none."""
     pose: int
-    camera: NDArray[np.float64]
+    camera: Floats
     """world_from_camera of that pose by odometry, shape (7,)."""
-    box: NDArray[np.float64]
-    drift: NDArray[np.float64] = field(default_factory=lambda: np.zeros(2))
+    box: Floats
+    drift: Floats = field(default_factory=lambda: np.zeros(2))
     """Motion of the center per image beside what the camera's turning explains, in pixels."""
 
-    def follow(
-        self,
-        pose: int,
-        camera: NDArray[np.float64],
-        box: NDArray[np.float64],
-        predicted: NDArray[np.float64],
-    ) -> None:
+    def follow(self, pose: int, camera: Floats, box: Floats, predicted: Floats) -> None:
         """Go on with a box, and learn from where it was predicted."""
         off = _centers(box) - _centers(predicted)
         self.drift = self.drift + 0.5 * off / (pose - self.pose)
@@ -65,18 +60,13 @@ class Linker:
         """Begin without tracks."""
         self._camera = camera
         self._tracks: list[_Track] = []
-        self._of_claim: dict[int, int] = {}
+        self._of_id: dict[int, Tracklet] = {}
         self.started = 0
         """Numbers below this are taken."""
 
     def link(
-        self,
-        pose: int,
-        camera: NDArray[np.float64],
-        box: NDArray[np.float64],
-        class_id: NDArray[np.int64],
-        claims: NDArray[np.int64],
-    ) -> NDArray[np.int64]:
+        self, pose: int, camera: Floats, box: Floats, class_id: Ints, tracker_ids: Ints
+    ) -> Ints:
         """Return the number of the tracklet of each box of an image, shape (b,).
 
         Parameters
@@ -87,70 +77,63 @@ class Linker:
             world_from_camera by odometry, shape (7,).
         box, class_id
             Shapes (b, 4) and (b,).
-        claims
+        tracker_ids
             Ids (b,) that a tracker gave, -1 for none: all boxes of an id are one tracklet.
         """
-        self._tracks = [track for track in self._tracks if pose - track.pose <= LONGEST_GAP]
+        self._tracks = [track for track in self._tracks if pose - track.pose <= MAX_IMAGES_UNSEEN]
         tracklet = np.full(len(box), -1, dtype=np.int64)
         predicted = _predict(self._tracks, pose, camera, self._camera)
-        own = np.array([(track.class_id, track.claim) for track in self._tracks]).reshape(-1, 2)
-        allowed = (own[:, None] == np.column_stack([class_id, claims])).all(axis=2)
+        own = [(track.class_id, track.tracker_id) for track in self._tracks]
+        new = np.column_stack([class_id, tracker_ids])
+        allowed = (np.array(own).reshape(-1, 1, 2) == new).all(axis=2)
         for i, j in _match(predicted, box, allowed):
             self._tracks[i].follow(pose, camera, box[j], predicted[i])
             tracklet[j] = self._tracks[i].number
         for j in np.flatnonzero(tracklet < 0).tolist():
-            claim = int(claims[j])
-            number = self._of_claim.get(claim)
+            tracker_id = int(tracker_ids[j])
+            number = self._of_id.get(tracker_id)
             if number is None:
-                number = self.new_number()
-            if claim >= 0:
-                self._of_claim[claim] = number
-            self._tracks.append(_Track(number, int(class_id[j]), claim, pose, camera, box[j]))
+                number = Tracklet(self.started)
+                self.started += 1
+            if tracker_id >= 0:
+                self._of_id[tracker_id] = number
+            self._tracks.append(_Track(number, int(class_id[j]), tracker_id, pose, camera, box[j]))
             tracklet[j] = number
         return tracklet
 
-    def new_number(self) -> int:
-        """Return a number that no tracklet has."""
-        self.started += 1
-        return self.started - 1
-
-    def cut(self, tracklet: int, number: int) -> None:
+    def cut(self, tracklet: Tracklet, number: Tracklet) -> None:
         """Go on with a tracklet under another number."""
         for track in self._tracks:
             if track.number == tracklet:
                 track.number = number
-        for claim, own in self._of_claim.items():
+        for tracker_id, own in self._of_id.items():
             if own == tracklet:
-                self._of_claim[claim] = number
+                self._of_id[tracker_id] = number
 
 
-def link_tracklets(
-    recording: Recording, *, claims: NDArray[np.int64] | None = None
-) -> NDArray[np.int64]:
+def link_tracklets(recording: Recording, *, tracker_ids: Ints | None = None) -> Ints:
     """Return the number of the tracklet of each box, shape (m,), in order of their first boxes.
 
-    ``claims`` are the ids (m,) that a tracker gave, -1 for none: all boxes of an id are one
+    ``tracker_ids`` (m,) are those that a tracker gave, -1 for none: all boxes of an id are one
     tracklet.
     """
     detections = recording.detections
     cameras = cameras_by_odometry(recording)
-    claims = np.full(len(detections), -1) if claims is None else claims
+    ids = np.full(len(detections), -1) if tracker_ids is None else tracker_ids
     tracklet = np.full(len(detections), -1, dtype=np.int64)
     linker = Linker(recording.camera)
     for pose, rows in group_by_pose(detections.pose):
         tracklet[rows] = linker.link(
-            pose, cameras[pose], detections.box[rows], detections.class_id[rows], claims[rows]
+            pose, cameras[pose], detections.box[rows], detections.class_id[rows], ids[rows]
         )
     return np.asarray(np.unique(tracklet, return_inverse=True)[1])
 
 
-def _centers(box: NDArray[np.float64]) -> NDArray[np.float64]:
+def _centers(box: Floats) -> Floats:
     return 0.5 * (box[..., :2] + box[..., 2:])
 
 
-def _predict(
-    tracks: list[_Track], pose: int, seen_from: NDArray[np.float64], camera: _core.Camera
-) -> NDArray[np.float64]:
+def _predict(tracks: list[_Track], pose: int, seen_from: Floats, camera: _core.Camera) -> Floats:
     """Return where the boxes of tracks are expected in the image of a pose, shape (t, 4)."""
     if not tracks:
         return np.zeros((0, 4))
@@ -170,9 +153,7 @@ def _predict(
     return np.asarray(box + np.tile(shift, (1, 2)))
 
 
-def _match(
-    predicted: NDArray[np.float64], box: NDArray[np.float64], allowed: NDArray[np.bool_]
-) -> list[tuple[int, int]]:
+def _match(predicted: Floats, box: Floats, allowed: Bools) -> list[tuple[int, int]]:
     """Pair tracks (t, 4) with boxes (b, 4) where ``allowed`` (t, b): by overlap, then the rest."""
     from scipy.optimize import linear_sum_assignment
 
@@ -183,24 +164,21 @@ def _match(
     pairs = [
         (i, j)
         for i, j in zip(rows.tolist(), columns.tolist(), strict=True)
-        if overlap[i, j] >= LEAST_OVERLAP
+        if overlap[i, j] >= MIN_OVERLAP
     ]
     return pairs + _only_choices(pairs, predicted, box, allowed)
 
 
 def _only_choices(
-    pairs: list[tuple[int, int]],
-    predicted: NDArray[np.float64],
-    box: NDArray[np.float64],
-    allowed: NDArray[np.bool_],
+    pairs: list[tuple[int, int]], predicted: Floats, box: Floats, allowed: Bools
 ) -> list[tuple[int, int]]:
     """Pair what is left where neither has another choice around."""
     size, new_size = predicted[:, 2:] - predicted[:, :2], box[:, 2:] - box[:, :2]
     offset = np.linalg.norm(_centers(predicted)[:, None] - _centers(box), axis=2)
     distance = np.where(allowed, offset / np.sqrt(size.prod(axis=1))[:, None], np.inf)
     growth = np.abs(np.log(size[:, None] / new_size)).max(axis=2)
-    near = distance < 2 * FARTHEST_SIDES
-    fits = (distance < FARTHEST_SIDES) & (growth < np.log(LARGEST_GROWTH))
+    near = distance < 2 * MAX_SIDES_AWAY
+    fits = (distance < MAX_SIDES_AWAY) & (growth < np.log(MAX_GROWTH))
     alone = (near.sum(axis=1) == 1)[:, None] & (near.sum(axis=0) == 1)
     tracks_taken, boxes_taken = {i for i, _ in pairs}, {j for _, j in pairs}
     return [

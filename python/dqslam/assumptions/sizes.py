@@ -3,7 +3,7 @@
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Self
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
@@ -19,6 +19,10 @@ class SizePrior:
     """Log of the median semi-axis in meters."""
     log_sigma: float = 0.7
     """Sigma of the log."""
+
+    def of(self, class_name: str) -> Self:
+        """Return the prior of a class: all have the same."""
+        return self
 
 
 @dataclass(frozen=True)

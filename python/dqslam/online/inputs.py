@@ -1,45 +1,40 @@
-"""What arrives at a step, as the core wants it: times, motions and noise, checked."""
+"""Checks of what arrives at a step; arrays as the core wants them."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dqslam import _core
-from dqslam._checks import Floats, as_covariances
+from dqslam._checks import Bools, Floats, Ints, as_covariances, reject_rows
 from dqslam.assumptions import BoxNoise
+from dqslam.online.integrated_odometry import identity_pose
 from dqslam.online.objects import Registry
-from dqslam.online.step import Motion, StepPositions
-from dqslam.recording import as_poses, pose_size, tangent_size
+from dqslam.online.step import Motion, StepBoxes, StepPositions
+from dqslam.recording import as_poses, tangent_size
 
 Int32s = NDArray[np.int32]
-
-_NO_POSITIONS = (np.zeros(0, dtype=np.int32), np.zeros((0, 3)), np.zeros((0, 9)))
 
 
 class PathBegin:
     """The first pose, and how well it is known."""
 
     def __init__(
-        self,
-        pose_model: _core.PoseModel,
-        pose: ArrayLike | None,
-        covariance: ArrayLike | None,
+        self, pose_model: _core.PoseModel, pose: ArrayLike | None, covariance: ArrayLike | None
     ) -> None:
         """Check; by default it is the origin, known exactly."""
-        origin = np.zeros(pose_size(pose_model))
-        if pose_model == _core.PoseModel.SE3:
-            origin[-1] = 1.0
-        given = origin if pose is None else pose
+        given = identity_pose(pose_model) if pose is None else pose
         self.pose = as_poses("first_pose", np.atleast_2d(given), pose_model)[0]
         """world_from_robot, shape (d,)."""
         self.covariance = np.zeros((0, 0))
         """Shape (k, k), empty where it is exact."""
         if covariance is not None:
-            k = tangent_size(pose_model)
             one = np.asarray(covariance, dtype=np.float64)[None]
+            k = tangent_size(pose_model)
             self.covariance = as_covariances("first_covariance", one, 1, k)[0]
 
 
@@ -72,21 +67,58 @@ def motion_arrays(
             "no odometry leads here; across a gap, give a guess and a covariance as wide"
         )
     believed = odometry.covariance if covariance is None else covariance
-    return (
-        np.asarray(odometry.relative, dtype=np.float64),
-        np.asarray(believed, dtype=np.float64),
-    )
+    return np.asarray(odometry.relative, np.float64), np.asarray(believed, np.float64)
+
+
+@dataclass(frozen=True, eq=False)
+class CheckedBoxes:
+    """Boxes whose shapes fit."""
+
+    box: Floats
+    object_id: Ints
+    class_name: Sequence[str]
+    truncated: Bools
+
+    def select(self, rows: Ints) -> CheckedBoxes:
+        """Return some of the boxes."""
+        names = [self.class_name[row] for row in rows.tolist()]
+        return CheckedBoxes(self.box[rows], self.object_id[rows], names, self.truncated[rows])
+
+
+_NO_BOXES = CheckedBoxes(
+    np.zeros((0, 4)), np.zeros(0, dtype=np.int64), (), np.zeros((0, 4), dtype=np.bool_)
+)
+
+
+def check_boxes(boxes: StepBoxes | None) -> CheckedBoxes:
+    """Return the boxes as arrays; ValueError names what does not fit. The core checks numbers."""
+    if boxes is None:
+        return _NO_BOXES
+    box = np.asarray(boxes.box, dtype=np.float64)
+    if box.size == 0:
+        return _NO_BOXES
+    count = len(box)
+    if box.shape != (count, 4):
+        raise ValueError(f"boxes: expected shape (n, 4), got {box.shape}")
+    reject_rows("boxes", ~np.isfinite(box), "NaN or infinite", box)
+    object_id = np.asarray(boxes.object_id)
+    if object_id.shape != (count,) or object_id.dtype.kind not in "iu":
+        raise ValueError(f"object_id: expected {count} whole numbers")
+    reject_rows("object_id", object_id < -1, "not an object id", object_id)
+    names = boxes.class_name or ("object",) * count
+    if len(names) != count:
+        raise ValueError(f"class_name: expected {count} names, got {len(names)}")
+    truncated = np.zeros((count, 4)) if boxes.truncated is None else np.asarray(boxes.truncated)
+    if truncated.shape != (count, 4):
+        raise ValueError(f"truncated: expected shape ({count}, 4), got {truncated.shape}")
+    return CheckedBoxes(box, object_id.astype(np.int64), names, truncated.astype(np.bool_))
 
 
 def box_noise_rows(noise: BoxNoise, box: Floats) -> Floats:
     """Return the covariances of boxes (b, 4), shape (b, 16)."""
     rows = np.zeros((len(box), 16))
-    if len(box):
-        if noise.relative:
-            side = np.tile(box[:, 2:] - box[:, :2], 2)
-            rows[:, ::5] = noise.pixels**2 + (noise.relative * side) ** 2
-        else:
-            rows[:, ::5] = noise.pixels**2
+    side = (box[:, 2:] - box[:, :2])[:, [0, 1, 0, 1]]
+    rows[:, ::5] = noise.pixels**2 + (noise.relative * side) ** 2
     return rows
 
 
@@ -95,11 +127,11 @@ def position_rows(
 ) -> tuple[Int32s, Floats, Floats]:
     """Return the rows of the objects (p,), their positions (p, 3) and covariances (p, 9)."""
     if positions is None:
-        return _NO_POSITIONS
+        return np.zeros(0, dtype=np.int32), np.zeros((0, 3)), np.zeros((0, 9))
     ids = np.asarray(positions.object_id).tolist()
-    unknown = [number for number in ids if number not in registry]
+    unknown = [one for one in ids if one not in registry.row_of]
     if unknown:
         raise ValueError(f"positions: object {unknown[0]} is not in the map yet")
-    rows = np.array([registry.row_of(number) for number in ids], dtype=np.int32)
+    rows = np.array([registry.row_of[one] for one in ids], dtype=np.int32)
     covariance = np.asarray(positions.covariance, dtype=np.float64).reshape(len(ids), 9)
     return rows, np.asarray(positions.object_in_robot, dtype=np.float64), covariance

@@ -1,4 +1,4 @@
-"""The way from one keyframe to the next: the motion of its steps composed, and its covariance."""
+"""The motion of several steps as one: composed, with its covariance."""
 
 from __future__ import annotations
 
@@ -8,40 +8,43 @@ import numpy as np
 
 from dqslam import _core
 from dqslam._checks import Floats
+from dqslam.association.noise import translation_axes
 from dqslam.association.thinning import transport
+from dqslam.recording import pose_size, tangent_size
+
+
+def identity_pose(pose_model: _core.PoseModel) -> Floats:
+    """Return the pose of the world itself, shape (d,)."""
+    pose = np.zeros(pose_size(pose_model))
+    if pose_model == _core.PoseModel.SE3:
+        pose[-1] = 1.0
+    return pose
 
 
 @dataclass(frozen=True, eq=False)
-class Leg:
-    """Steps composed."""
+class IntegratedOdometry:
+    """From the pose before the steps to the one after them."""
 
     relative: Floats
     """End in start, shape (d,)."""
-    covariance: Floats
-    """As the steps had it, shape (k, k)."""
-    per_translation: Floats
-    """For a sigma of 1 m a step, shape (k, k)."""
-    per_rotation: Floats
-    """For a sigma of 1 rad a step, shape (k, k)."""
+    covariances: Floats
+    """As the steps had it, for a sigma of 1 m a step, and for one of 1 rad a step, (3, k, k)."""
 
     @classmethod
-    def of_no_steps(cls, pose_model: _core.PoseModel) -> Leg:
+    def of_no_steps(cls, pose_model: _core.PoseModel) -> IntegratedOdometry:
         """Stay where we are."""
-        d, k = (3, 3) if pose_model == _core.PoseModel.SE2 else (7, 6)
-        still = np.zeros(d)
-        if pose_model == _core.PoseModel.SE3:
-            still[-1] = 1.0
-        nothing = np.zeros((k, k))
-        return cls(still, nothing, nothing, nothing)
+        k = tangent_size(pose_model)
+        return cls(identity_pose(pose_model), np.zeros((3, k, k)))
 
-    def then(self, pose_model: _core.PoseModel, relative: Floats, covariance: Floats) -> Leg:
+    def then(
+        self, pose_model: _core.PoseModel, relative: Floats, covariance: Floats
+    ) -> IntegratedOdometry:
         """Go on by a step."""
         k = len(covariance)
-        is_translation = np.arange(k) < (2 if k == 3 else 3)
+        is_translation = np.arange(k) < translation_axes(k)
+        step = np.array([covariance, np.diag(is_translation), np.diag(~is_translation)])
         moved = transport(pose_model, relative[None])[0]
-        before = (self.covariance, self.per_translation, self.per_rotation)
-        step = (covariance, np.diag(is_translation * 1.0), np.diag(~is_translation * 1.0))
-        return Leg(
+        return IntegratedOdometry(
             _core.compose(pose_model, self.relative[None], relative[None])[0],
-            *(moved @ old @ moved.T + new for old, new in zip(before, step, strict=True)),
+            moved @ self.covariances @ moved.T + step,
         )

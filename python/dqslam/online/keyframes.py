@@ -1,156 +1,123 @@
-"""What the association of a session remembers: keyframes, their boxes, and what these show."""
+"""The keyframes of a session, their boxes, and which object each of them shows."""
 
 from __future__ import annotations
 
+import copy
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from dqslam._checks import Bools, Floats, Ints
+from dqslam._checks import Floats, Ints
+from dqslam._ids import ObjectId, ObjectRow
+from dqslam.association.labels import Labels
 from dqslam.assumptions import OdometryNoise, SizePrior, SizePriors
-from dqslam.online.integrated_odometry import Leg
+from dqslam.online.inputs import CheckedBoxes
+from dqslam.online.integrated_odometry import IntegratedOdometry
+
+_NONE = np.zeros(0, dtype=np.int64)
 
 
-@dataclass(eq=False)
+@dataclass(frozen=True, eq=False)
 class Keyframe:
     """An image whose boxes take part in the estimate."""
 
     pose: int
     """Row of the session."""
     timestamp: float
-    leg: Leg
-    """The way from the keyframe before."""
-    sight: Ints
-    """Rows of the boxes in the session, shape (b,)."""
-    box: Floats
-    truncated: Bools
-    class_id: Ints
-    claim: Ints
-    """Ids that a tracker gave, -1 for none."""
-    tracklet: Ints
-    object: Ints
-    """Row of the object that each shows, -1 while it waits."""
+    odometry: IntegratedOdometry
+    """From the keyframe before."""
+    boxes: CheckedBoxes
 
 
-class Journal:
-    """Keyframes in the order of time, and the objects that their boxes show.
+class KeyframeStore:
+    """Keyframes in the order of time: the one owner of what their boxes show.
 
-    Rows of objects are those of the session.
+    Boxes are rows of all keyframes together, objects rows of the session. Arrays are replaced and
+    never written to, so that a snapshot costs nothing.
     """
 
     def __init__(self, size_prior: SizePrior | SizePriors | None) -> None:
         """Begin without a keyframe."""
+        self.keyframes: list[Keyframe] = []
+        self.labels = Labels(_NONE, _NONE, 0)
+        self.observation_rows = _NONE
+        """Of each box, in the session, shape (m,)."""
+        self.box_keyframe = _NONE
+        """Keyframe of each box, shape (m,)."""
+        self.tracker_ids = _NONE
+        """Id that a tracker gave to each box, -1 for none, shape (m,)."""
         self.size_prior = size_prior
-        """None until some objects have told it."""
+        """None until it has been learned from some objects."""
         self.odometry_noise = OdometryNoise()
         """Of one step, where that is estimated."""
-        self.keyframes: list[Keyframe] = []
-        self._class_ids: dict[str, int] = {}
-        self.votes = np.zeros((0, 0), dtype=np.int64)
-        """How often each object was called each class, shape (o, c)."""
-        self.object_of_tracklet: dict[int, int] = {}
-        self.left_out: dict[int, str] = {}
-        """Objects that take no part in the estimate, and why."""
-        self.map_covariance: dict[int, Floats] = {}
+        self.map_covariance: dict[ObjectRow, Floats] = {}
         """Of objects that were known before the session, (9, 9)."""
-        self._keyframe_of: dict[int, int] = {}  # of a box
-        self._boxes: dict[int, set[int]] = {}  # of an object
-        self._born: list[int] = []
-        self._looked: dict[int, tuple[Ints, Ints]] = {}  # of a step: boxes and their tracklets
+        self._class_ids: dict[str, int] = {}
+        self._images: dict[int, tuple[Ints, Ints]] = {}  # of a step: boxes and their tracklets
 
     # ---- images
 
-    def add_keyframe(self, frame: Keyframe) -> None:
-        """Add the last image; its boxes wait."""
-        for sight in frame.sight.tolist():
-            self._keyframe_of[sight] = len(self.keyframes)
-        self.keyframes.append(frame)
+    def add_image(self, step: int, rows: Ints, tracklets: Ints, *, free_tracklet: int) -> None:
+        """Remember the tracklets of some boxes of a step; numbers from the free one on are new."""
+        self._images[step] = (rows, tracklets)
+        self.labels.make_room(tracklets=free_tracklet)
 
-    def class_ids(self, names: list[str]) -> Ints:
-        """Return a number for each name, the same for the same."""
-        return np.array(
-            [self._class_ids.setdefault(name, len(self._class_ids)) for name in names],
-            dtype=np.int64,
-        )
+    def add_keyframe(self, keyframe: Keyframe, observation_rows: Ints, tracklets: Ints) -> None:
+        """Add the last image; its boxes wait."""
+        number = np.full(len(tracklets), len(self.keyframes))
+        self.box_keyframe = np.append(self.box_keyframe, number)
+        self.observation_rows = np.append(self.observation_rows, observation_rows)
+        self.tracker_ids = np.append(self.tracker_ids, keyframe.boxes.object_id)
+        self.labels.add_boxes(tracklets, self.class_ids(keyframe.boxes.class_name))
+        self.keyframes.append(keyframe)
+
+    def class_ids(self, names: Sequence[str]) -> Ints:
+        """Return the column of each name among the labels' votes, the same for the same."""
+        ids = [self._class_ids.setdefault(name, len(self._class_ids)) for name in names]
+        self.labels.make_room(classes=len(self._class_ids))
+        return np.array(ids, dtype=np.int64)
 
     @property
-    def class_names(self) -> list[str]:
-        """What the numbers stand for."""
-        return list(self._class_ids)
-
-    def remember(self, step: int, boxes: Ints, tracklet: Ints) -> None:
-        """Remember the tracklets of some boxes of a step."""
-        self._looked[step] = (boxes, tracklet)
+    def class_names(self) -> dict[int, str]:
+        """What the columns stand for."""
+        return {number: name for name, number in self._class_ids.items()}
 
     def shown(self) -> dict[int, tuple[Ints, Ints]]:
-        """Return the boxes that each step looked at and the objects they show, -1 for none."""
-        own = self.object_of_tracklet
+        """Return the boxes of each step that were identified and their objects, -1 for none."""
+        labels = self.labels
         shown = {
-            step: (boxes, np.array([own.get(one, -1) for one in tracklet.tolist()], dtype=np.int64))
-            for step, (boxes, tracklet) in self._looked.items()
+            step: (rows, labels.object_of_tracklet[tracklets])
+            for step, (rows, tracklets) in self._images.items()
         }
-        for frame in self.keyframes:
-            shown[frame.pose] = (shown[frame.pose][0], frame.object)
+        ends = np.cumsum([len(frame.boxes.box) for frame in self.keyframes])
+        for frame, own in zip(self.keyframes, np.split(labels.object_rows, ends)[:-1], strict=True):
+            shown[frame.pose] = (shown[frame.pose][0], own)
         return shown
 
     # ---- objects
 
-    def boxes_of(self, number: int) -> set[int]:
-        """Return the boxes that show an object, rows of the session."""
-        return self._boxes.get(number, set())
+    def snapshot(self) -> Labels:
+        """Return what boxes show now, to be compared with what they show later."""
+        return copy.copy(self.labels)
 
-    def keyframes_of(self, number: int) -> list[int]:
-        """Return the keyframes that show an object, ascending."""
-        return sorted(self._keyframe_of[sight] for sight in self.boxes_of(number))
+    def keyframes_of(self, row: ObjectRow) -> Ints:
+        """Return the keyframe of each box that shows an object, ascending."""
+        return np.asarray(self.box_keyframe[self.labels.object_rows == row])
 
-    def called(self, number: int) -> Counter[str]:
+    def tracker_id_of(self, row: ObjectRow) -> ObjectId:
+        """Return the id that a tracker gave to the first box of an object, -1 for none."""
+        return ObjectId(int(self.tracker_ids[np.argmax(self.labels.object_rows == row)]))
+
+    def votes(self, row: ObjectRow) -> Counter[str]:
         """Return how often an object was called what."""
-        votes = self.votes[number].tolist()
-        return Counter({name: n for name, n in zip(self._class_ids, votes, strict=True) if n})
+        votes = self.labels.votes[row].tolist() if row < len(self.labels.votes) else []
+        return Counter({name: n for name, n in zip(self._class_ids, votes, strict=False) if n})
 
-    def give(self, sight: int, number: int) -> None:
-        """Let a box show another object, or none where the number is -1."""
-        frame = self.keyframes[self._keyframe_of[sight]]
-        row = int(np.searchsorted(frame.sight, sight))
-        before, class_id = int(frame.object[row]), frame.class_id[row]
-        if before >= 0:
-            self.votes[before, class_id] -= 1
-            self._boxes[before].discard(sight)
-        if number >= 0:
-            self.votes[number, class_id] += 1
-            self._boxes.setdefault(number, set()).add(sight)
-        frame.object[row] = number
-
-    def claim_of(self, number: int) -> int:
-        """Return the id that most boxes of an object claim, -1 for none."""
-        frames = [self.keyframes[self._keyframe_of[sight]] for sight in self.boxes_of(number)]
-        claims = Counter(
-            int(claim)
-            for sight, frame in zip(self.boxes_of(number), frames, strict=True)
-            for claim in frame.claim[frame.sight == sight]
-        )
-        return claims.most_common(1)[0][0] if claims else -1
-
-    def bear_objects(self, count: int) -> None:
-        """Take in objects that boxes without ids have told."""
-        known = len(self.votes)
-        self.know_objects(known + count)
-        self._born += range(known, known + count)
-
-    def hidden(self) -> set[int]:
-        """Return objects that were born here and have no box any more, or are left out."""
-        return {row for row in self._born if not self.votes[row].any()} | set(self.left_out)
-
-    def know_objects(self, count: int) -> None:
-        """Make room for objects that the session has; nothing is known of their boxes."""
-        grown = np.zeros((max(count, len(self.votes)), len(self._class_ids)), dtype=np.int64)
-        grown[: len(self.votes), : self.votes.shape[1]] = self.votes
-        self.votes = grown
-
-    def know_map_object(self, number: int, class_name: str, covariance: Floats) -> None:
-        """Take in an object of a map: its covariance (9, 9)."""
-        class_id = int(self.class_ids([class_name])[0])
-        self.know_objects(number + 1)
-        self.votes[number, class_id] += 1
-        self.map_covariance[number] = covariance
+    def add_map_object(self, row: ObjectRow, class_name: str, covariance: Floats) -> None:
+        """Add an object of a map, that is called its class once, and its covariance (9, 9)."""
+        column = int(self.class_ids([class_name])[0])
+        self.labels.make_room(objects=row + 1)
+        self.labels.votes[row, column] += 1
+        self.map_covariance[row] = covariance

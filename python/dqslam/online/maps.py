@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from dqslam import _core
 from dqslam._checks import Floats
+from dqslam._ids import ObjectId, ObjectRow
 from dqslam.io import FileError, load_results, save_estimate
+from dqslam.online.readout import read_estimate
+from dqslam.online.state import State
+from dqslam.recording import tangent_size
 
-if TYPE_CHECKING:
-    from dqslam.online.slam import OnlineSlam
-
-# Where a result says nothing of its uncertainty: sigma of the center [m] and of the log axes.
-_CENTER_SIGMA_M, _LOG_SIGMA = 0.05, 0.1
+# Sigmas of the center [m] and of the log axes, where a result has none: well measured, not exact.
+UNKNOWN_CENTER_SIGMA_M, UNKNOWN_LOG_SIGMA = 0.05, 0.1
+# An orientation is never known worse than by this [rad]: where axes are equal it says nothing.
+MAX_ANGLE_SIGMA = 0.5
+# Of the differences that stand for derivatives.
 _STEP = 1e-6
 
 
@@ -27,16 +29,12 @@ class KnownMap:
     """Objects that a session begins with."""
 
     camera: _core.Camera
-    ids: list[int]
+    object_ids: list[ObjectId]
     class_names: tuple[str, ...]
     ellipsoids: Floats
     """Shape (o, 9)."""
     covariances: Floats
     """Of these, shape (o, 9, 9)."""
-
-    def rows(self) -> Iterator[tuple[int, str, Floats, Floats]]:
-        """Go through id, class, ellipsoid and covariance of each object."""
-        yield from zip(self.ids, self.class_names, self.ellipsoids, self.covariances, strict=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,35 +43,35 @@ class _Covariances:
     objects: Floats
 
 
-def load_map(directory: str | Path) -> KnownMap:
+def load_map(directory: str | Path, robot_from_camera: ArrayLike | None = None) -> KnownMap:
     """Read the objects of a result that are ellipsoids, and how uncertain they are.
 
     A result has the covariance of the center and the sigmas of the log semi-axes; the orientation
-    is taken to be known as well as the axes differ.
+    is taken to be known as well as the axes differ. It does not have where the camera is on the
+    robot: by default, robot and camera are the same.
     """
     results = load_results(directory)
     objects = results.objects
     rows = np.flatnonzero(objects.is_ellipsoid)
     if not rows.size:
         raise FileError(Path(directory) / "map.json", "has no ellipsoid to find the way by")
-    covariances = []
-    for row in rows:
-        center = objects.center_covariance[row]
-        sigma = objects.log_semi_axes_sigma[row]
-        covariance = np.zeros((9, 9))
-        known = np.isfinite(center).all()
-        covariance[:3, :3] = center if known else _CENTER_SIGMA_M**2 * np.eye(3)
-        log_sigma = sigma if np.isfinite(sigma).all() else np.full(3, _LOG_SIGMA)
+    covariances = np.zeros((len(rows), 9, 9))
+    for covariance, row in zip(covariances, rows, strict=True):
+        center, sigma = objects.center_covariance[row], objects.log_semi_axes_sigma[row]
+        if not np.isfinite(center).all():
+            center = UNKNOWN_CENTER_SIGMA_M**2 * np.eye(3)
+        if not np.isfinite(sigma).all():
+            sigma = np.full(3, UNKNOWN_LOG_SIGMA)
+        covariance[:3, :3] = center
         covariance[3:, 3:] = _shape_covariance(
-            objects.semi_axes[row], objects.orientation_xyzw[row], log_sigma
+            objects.semi_axes[row], objects.orientation_xyzw[row], sigma
         )
-        covariances.append(covariance)
     return KnownMap(
-        camera=results.camera,
-        ids=objects.id[rows].tolist(),
+        camera=_with_mount(results.camera, robot_from_camera),
+        object_ids=objects.id[rows].tolist(),
         class_names=tuple(objects.class_name[row] for row in rows),
         ellipsoids=objects.ellipsoids[rows],
-        covariances=np.array(covariances),
+        covariances=covariances,
     )
 
 
@@ -82,33 +80,29 @@ def _shape_covariance(semi_axes: Floats, orientation_xyzw: Floats, log_sigma: Fl
 
     Of six independent changes, the logarithms of the axes and the angles between them: turning by
     an angle a in the plane of axes i and j changes log S by (log s_i - log s_j) a. Angles have the
-    sigma at which that equals the larger of the two log sigmas, at most half a radian.
+    sigma at which that equals the larger of the two log sigmas.
     """
-    center = np.zeros(3)
-    origin = _core.ellipsoid_from_axes(center, semi_axes, orientation_xyzw)[3:]
-    columns = []
-    for axis in range(3):
-        grown = semi_axes.copy()
-        grown[axis] *= np.exp(_STEP)
-        moved = _core.ellipsoid_from_axes(center, grown, orientation_xyzw)[3:]
-        columns.append((moved - origin) / _STEP * log_sigma[axis])
     from scipy.spatial.transform import Rotation
 
-    turn = Rotation.from_quat(orientation_xyzw)
-    logs = np.log(semi_axes)
-    for axis in range(3):
+    def shape(axes: Floats, quaternion: Floats) -> Floats:
+        return _core.ellipsoid_from_axes(np.zeros(3), axes, quaternion)[3:]
+
+    origin, logs = shape(semi_axes, orientation_xyzw), np.log(semi_axes)
+    columns = []
+    for axis, unit in enumerate(np.eye(3)):
+        grown = shape(semi_axes * np.exp(_STEP * unit), orientation_xyzw)
+        columns.append((grown - origin) / _STEP * log_sigma[axis])
+    for axis, unit in enumerate(np.eye(3)):
         i, j = (axis + 1) % 3, (axis + 2) % 3
         apart = abs(logs[i] - logs[j]) + 1e-3
-        sigma = min(max(log_sigma[i], log_sigma[j]) / apart, 0.5)
-        small = Rotation.from_rotvec(_STEP * np.eye(3)[axis])
-        moved = _core.ellipsoid_from_axes(center, semi_axes, (turn * small).as_quat())[3:]
-        columns.append((moved - origin) / _STEP * sigma)
+        sigma = min(max(log_sigma[i], log_sigma[j]) / apart, MAX_ANGLE_SIGMA)
+        turned = Rotation.from_quat(orientation_xyzw) * Rotation.from_rotvec(_STEP * unit)
+        columns.append((shape(semi_axes, turned.as_quat()) - origin) / _STEP * sigma)
     jacobian = np.array(columns).T
     return np.asarray(jacobian @ jacobian.T + 1e-10 * np.eye(6))
 
 
-def with_mount(camera: _core.Camera, robot_from_camera: ArrayLike | None) -> _core.Camera:
-    """Return a camera where it is on the robot; by default, robot and camera are the same."""
+def _with_mount(camera: _core.Camera, robot_from_camera: ArrayLike | None) -> _core.Camera:
     if robot_from_camera is None:
         return camera
     return _core.Camera(
@@ -123,37 +117,40 @@ def with_mount(camera: _core.Camera, robot_from_camera: ArrayLike | None) -> _co
     )
 
 
-def object_covariances(
-    session: _core.Session, options: _core.SolveOptions, *, skip: set[int]
-) -> dict[int, Floats]:
-    """Return the covariance (9, 9) of each object that the session has boxes of, by row.
+def add_map(state: State, known: KnownMap) -> None:
+    """Begin a session with the objects of a map."""
+    for one, name, ellipsoid, covariance in zip(
+        known.object_ids, known.class_names, known.ellipsoids, known.covariances, strict=True
+    ):
+        prior = state.prior.of(name)
+        state.core.add_map_object(ellipsoid, covariance, prior.log_mean, prior.log_sigma)
+        state.registry.register([one])
+        state.store.add_map_object(state.registry.row_of[one], name, covariance)
 
-    Objects of a loaded map are left out: the problem does not have their priors.
+
+def object_covariances(state: State) -> dict[ObjectRow, Floats]:
+    """Return the covariance (9, 9) of each object of a session that has one.
+
+    Of a continued map these are what it was loaded with: the problem does not have its priors.
     """
-    if session.num_poses < 1:
+    core, known = state.core, state.store.map_covariance
+    if core.num_poses == 0 or known:
+        return known
+    graph, rows = core.to_graph()
+    if not rows:
         return {}
-    graph, rows = session.to_graph()
-    if not rows or skip:
-        return {}
-    state = _core.State(session.poses, session.ellipsoids[rows])
-    objects = _core.covariance(graph, options, state).objects.reshape(-1, 9, 9)
-    known = [bool(np.isfinite(one).all()) for one in objects]
-    return {
-        row: one
-        for row, one, good in zip(rows, objects, known, strict=True)
-        if good and row not in skip
-    }
+    at = _core.State(core.poses, core.ellipsoids[rows])
+    found = _core.covariance(graph, state.settings.solve_options, at).objects.reshape(-1, 9, 9)
+    determined = np.isfinite(found).all(axis=(1, 2))
+    return {ObjectRow(rows[place]): found[place] for place in np.flatnonzero(determined)}
 
 
-def save_session(
-    slam: OnlineSlam, covariances: Mapping[int, Floats], directory: str | Path
-) -> None:
-    """Write the estimate with the covariances of its objects, by id."""
-    estimate = slam.estimate()
+def save_map(state: State, directory: str | Path) -> None:
+    """Write the estimate of a session with the covariances of its objects."""
+    estimate = read_estimate(state)
+    covariances = object_covariances(state)
     unknown = np.full((9, 9), np.nan)
-    objects = np.array(
-        [covariances.get(number, unknown) for number in estimate.object_ids.tolist()]
-    )
-    k = 3 if slam.pose_model == _core.PoseModel.SE2 else 6
-    poses = np.full((len(estimate.poses), k, k), np.nan)
-    save_estimate(estimate, directory, marginals=_Covariances(poses, objects.reshape(-1, 9, 9)))
+    rows = [state.registry.row_of[one] for one in estimate.object_ids.tolist()]
+    objects = np.array([covariances.get(row, unknown) for row in rows]).reshape(-1, 9, 9)
+    poses = np.full((len(estimate.poses), *(tangent_size(estimate.pose_model),) * 2), np.nan)
+    save_estimate(estimate, directory, marginals=_Covariances(poses, objects))

@@ -1,103 +1,79 @@
-"""The objects of a session: ids, classes and size priors of the core's rows."""
+"""The objects of a session as users see them, and which row of the session has which id."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
+from dqslam import _core
 from dqslam._checks import Floats, Ints
-from dqslam.assumptions import SizePrior, SizePriors
+from dqslam._ids import ObjectId, ObjectRow
 
 
 @dataclass(frozen=True, eq=False)
 class Objects:
     """The map as it stands."""
 
-    ids: Ints
+    object_ids: Ints
     """In the order in which they were seen first, shape (o,)."""
     class_names: tuple[str, ...]
     """One per object: the class most of its boxes have."""
-    ellipsoids: Floats
-    """Center and log-Cholesky shape, shape (o, 9)."""
     observations: Ints
     """Boxes per object in this session, shape (o,)."""
+    ellipsoids: Floats
+    """Center and log-Cholesky shape, shape (o, 9)."""
 
     def __len__(self) -> int:
         """Return the number of objects."""
-        return len(self.ids)
+        return len(self.object_ids)
 
     @property
     def centers(self) -> Floats:
         """In the world, meters, shape (o, 3)."""
         return self.ellipsoids[:, :3]
 
+    @property
+    def dual_quadrics(self) -> Floats:
+        """q1 .. q9 with Q*(4,4) = 1, shape (o, 9)."""
+        quadrics = [_core.dual_quadric_from_ellipsoid(one) for one in self.ellipsoids]
+        return np.array(quadrics).reshape(-1, 9)
+
+
+ANY_ID = ObjectId(-1)
+"""Stands for an id that no object has."""
+
 
 class Registry:
-    """Which row of the core an id has, and what is known of it beside its place."""
+    """Ids of the session's objects by row, and what boxes with final ids called them."""
 
-    def __init__(self, size_prior: SizePrior | SizePriors | None) -> None:
-        """Begin without objects."""
-        self.ids: list[int] = []
+    def __init__(self, ids: Iterable[ObjectId] = ()) -> None:
+        """Begin with some objects."""
+        self.ids: list[ObjectId] = []
+        self.row_of: dict[ObjectId, ObjectRow] = {}
         self.votes: list[Counter[str]] = []
-        self.priors: list[SizePrior] = []
-        self._row: dict[int, int] = {}
-        self.size_prior = SizePrior() if size_prior is None else size_prior
+        """How often boxes that came with its id called an object what, by row."""
+        self.register(ids)
 
-    def __contains__(self, number: int) -> bool:
-        """Tell whether an object has this id."""
-        return number in self._row
+    def rows_of(self, ids: Sequence[ObjectId]) -> tuple[list[ObjectRow], list[int]]:
+        """Return the rows of ids, and the first place in ``ids`` of those that are new.
 
-    def row_of(self, number: int) -> int:
-        """Return the row of an id."""
-        return self._row[number]
-
-    def next_id(self) -> int:
-        """Return an id that no object has."""
-        return max(self.ids, default=-1) + 1
-
-    def rows(
-        self, ids: Sequence[int], names: Sequence[str]
-    ) -> tuple[list[int], list[tuple[int, SizePrior]]]:
-        """Return the rows of ids, and the id and prior of those that are new; registers nothing."""
-        rows: list[int] = []
-        new: list[tuple[int, SizePrior]] = []
-        found: dict[int, int] = {}
-        for number, name in zip(ids, names, strict=True):
-            row = self._row.get(number)
-            if row is None:
-                row = found.get(number)
-            if row is None:
-                row = found[number] = len(self.ids) + len(new)
-                new.append((number, self.prior_of(name)))
-            rows.append(row)
-        return rows, new
-
-    def prior_of(self, name: str) -> SizePrior:
-        """Return the size prior of a class."""
-        given = self.size_prior
-        return given.of(name) if isinstance(given, SizePriors) else given
-
-    def register(self, new: Sequence[tuple[int, SizePrior]]) -> None:
-        """Take new objects in."""
-        for number, prior in new:
-            self._row[number] = len(self.ids)
-            self.ids.append(number)
-            self.votes.append(Counter())
-            self.priors.append(prior)
-
-    def take(
-        self, votes: Mapping[int, Counter[str]], ids: Sequence[int], priors: Sequence[SizePrior]
-    ) -> None:
-        """Take over how often objects were called what, by row.
-
-        New ones have ids, -1 where any will do, and size priors.
+        New ones are to be registered in this order.
         """
-        for number, prior in zip(ids, priors, strict=True):
-            self.register([(number if number >= 0 else self.next_id(), prior)])
-        for row, counts in votes.items():
-            self.votes[row] = counts
+        new: dict[ObjectId, ObjectRow] = {}
+        first = []
+        for place, one in enumerate(ids):
+            if one not in self.row_of and one not in new:
+                new[one] = ObjectRow(len(self.ids) + len(new))
+                first.append(place)
+        return [self.row_of[one] if one in self.row_of else new[one] for one in ids], first
 
-    def class_names(self) -> tuple[str, ...]:
-        """Return the class of each object: the one most of its boxes have."""
-        return tuple(votes.most_common(1)[0][0] if votes else "object" for votes in self.votes)
+    def register(self, ids: Iterable[ObjectId]) -> None:
+        """Add objects by their ids."""
+        for one in ids:
+            name = ObjectId(max(self.ids, default=-1) + 1) if one == ANY_ID else one
+            self.row_of[name] = ObjectRow(len(self.ids))
+            self.ids.append(name)
+            self.votes.append(Counter())

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass
 from threading import Thread
-from typing import Protocol
 
 import numpy as np
 
 from dqslam import _core
 from dqslam._checks import Floats
 
-_ITERATIONS = 50
+# Of the session's own minimization, which stops where the cost does.
+MAX_SMOOTHING_ITERATIONS = 50
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,95 +22,75 @@ class Polished:
 
     poses: Floats
     """Shape (n, d); empty where there was nothing to do."""
-    objects: int
-    """Rows of objects that there were."""
-    rows: list[int]
-    """Those that the solve moved."""
+    num_objects: int
+    """How many objects the session had."""
+    object_rows: list[int]
+    """Rows of those that the solve moved."""
     ellipsoids: Floats
-    """Shape (len(rows), 9)."""
+    """Of these, center and log-Cholesky shape, shape (len(object_rows), 9)."""
     cost: float
     """Half the sum of squared residuals, in sigmas, after the loss; NaN where nothing was done."""
     summary: _core.Summary | None
     """None where a map was continued, or nothing was done."""
+
+    @classmethod
+    def of(cls, solution: _core.Solution, num_objects: int, rows: list[int]) -> Polished:
+        """Take what the core found of a session with so many objects, of some of their rows."""
+        summary = solution.summary
+        cost = summary.final_cost
+        return cls(solution.poses, num_objects, rows, solution.landmarks, cost, summary)
 
 
 NOTHING = Polished(np.zeros((0, 0)), 0, [], np.zeros((0, 9)), np.nan, None)
 """What is found where there is nothing to do."""
 
 
-def polished(solution: _core.Solution, objects: int, rows: list[int]) -> Polished:
-    """Say what a solve found of so many objects, of which it moved some rows."""
-    return Polished(
-        poses=solution.poses,
-        objects=objects,
-        rows=rows,
-        ellipsoids=solution.landmarks,
-        cost=solution.summary.final_cost,
-        summary=solution.summary,
-    )
-
-
-class Polish(Protocol):
+@dataclass(frozen=True, eq=False)
+class Polish:
     """A solve of what a session had when the polish was made."""
 
-    def work(self) -> Polished:
-        """Solve; touches nothing but a copy of the session."""
+    work: Callable[[], Polished]
+    """Solves; touches nothing but a copy of the session."""
+    merge: Callable[[Polished], None]
+    """Takes over what was found: what arrived meanwhile moves along."""
 
-    def merge(self, found: Polished) -> None:
-        """Take over what was found: what arrived meanwhile moves along."""
 
+def solve_all(core: _core.Session, options: _core.SolveOptions) -> Polish:
+    """Make a polish of the problem as ``solve`` has it, from where the session stands."""
+    num_objects = core.num_objects
+    graph, rows = core.to_graph()
+    start = _core.State(core.poses, core.ellipsoids[rows])
 
-class Solve:
-    """The problem as ``solve`` has it, from where the session stands."""
-
-    def __init__(self, session: _core.Session, options: _core.SolveOptions) -> None:
-        """Copy what there is; a step is needed."""
-        self._session = session
-        self._options = options
-        self._objects = session.num_objects
-        self._graph, self._rows = session.to_graph()
-        self._start = _core.State(session.poses, session.ellipsoids[self._rows])
-
-    def work(self) -> Polished:
-        """Solve; without a box there is nothing to do."""
-        if not self._rows:
+    def work() -> Polished:
+        if not rows:
             return NOTHING
-        solution = _core.solve(self._graph, self._options, self._start)
-        return polished(solution, self._objects, self._rows)
+        return Polished.of(_core.solve(graph, options, start), num_objects, rows)
 
-    def merge(self, found: Polished) -> None:
-        """Move all objects that there were."""
-        _merge(found, self._session)
+    return Polish(work, lambda found: _move(core, found))
 
 
-class Smoothing:
-    """All poses of a session that continues a map.
+def smooth_all(core: _core.Session) -> Polish:
+    """Make a polish of all poses of a session that continues a map.
 
     The map's objects are Gaussian priors, which ``solve`` has not; the session's own minimization
     has them.
     """
+    smoothed = core.clone()
 
-    def __init__(self, session: _core.Session) -> None:
-        """Copy what there is."""
-        self._session = session
-        self._copy = session.clone()
+    def work() -> Polished:
+        cost = smoothed.smooth(MAX_SMOOTHING_ITERATIONS)
+        rows = list(range(smoothed.num_objects))
+        return Polished(smoothed.poses, len(rows), rows, smoothed.ellipsoids, cost, None)
 
-    def work(self) -> Polished:
-        """Minimize all poses of the copy."""
-        copy = self._copy
-        cost, count = copy.smooth(_ITERATIONS), copy.num_objects
-        return Polished(copy.poses, count, list(range(count)), copy.ellipsoids, cost, None)
-
-    def merge(self, found: Polished) -> None:
-        """Move all objects that there were."""
-        _merge(found, self._session)
+    return Polish(work, lambda found: _move(core, found))
 
 
-def _merge(found: Polished, session: _core.Session) -> None:
+def _move(core: _core.Session, found: Polished) -> None:
+    """Move the poses and objects that there were to where they were found."""
     if len(found.poses):
-        ellipsoids = session.ellipsoids[: found.objects]
-        ellipsoids[found.rows] = found.ellipsoids
-        session.merge(found.poses, ellipsoids)
+        ellipsoids = core.ellipsoids[: found.num_objects]
+        ellipsoids[found.object_rows] = found.ellipsoids
+        core.merge(found.poses, ellipsoids)
 
 
 class Polisher:

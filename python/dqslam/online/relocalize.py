@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from dqslam import _core
 from dqslam._checks import Floats, Ints
-from dqslam.online.objects import Objects
-from dqslam.online.step import CheckedBoxes, StepBoxes
+from dqslam.online.inputs import box_noise_rows, check_boxes
+from dqslam.online.maps import object_covariances
+from dqslam.online.readout import read_objects
+from dqslam.online.state import State
+from dqslam.online.step import StepBoxes
 
-# Boxes that are needed: of known objects, and where only classes are known.
-FEWEST_KNOWN = {_core.PoseModel.SE2: 2, _core.PoseModel.SE3: 3}
-FEWEST_UNKNOWN = 4
-# Another place is as good if its chi-square is no more than this above: 20 to 1 (2 ln 20).
-AMBIGUOUS = 6.0
+# Boxes that are needed: as many as determine the pose where their objects are known ...
+MIN_BOXES_WITH_IDS = {_core.PoseModel.SE2: 2, _core.PoseModel.SE3: 3}
+# ... and more where only classes are, for other objects of these may fit by chance.
+MIN_BOXES_WITHOUT_IDS = 4
+# A place is ambiguous if another's chi-square is no more than this above: 20 to 1 (2 ln 20).
+MIN_CHI2_MARGIN = 6.0
 # Where the covariance of an object is unknown, m^2 and log meters: a centimeter or so.
-_UNKNOWN = np.diag([1e-4] * 3 + [1e-3] * 3 + [1e-4] * 3)
+_UNKNOWN_COVARIANCE = np.diag([1e-4] * 3 + [1e-3] * 3 + [1e-4] * 3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,53 +39,37 @@ class Relocation:
 
     def with_ids(self, boxes: StepBoxes) -> StepBoxes:
         """Return the boxes that show objects of the map, with these objects' ids."""
-        known = self.object_id >= 0
-        rows = np.flatnonzero(known)
-        return replace(
-            boxes,
-            box=np.asarray(boxes.box)[known],
-            object_id=self.object_id[known],
-            class_name=tuple(boxes.class_name[row] for row in rows.tolist())
-            if boxes.class_name
-            else (),
-            truncated=None if boxes.truncated is None else np.asarray(boxes.truncated)[known],
-        )
+        known = np.flatnonzero(self.object_id >= 0)
+        some = check_boxes(replace(boxes, object_id=self.object_id)).select(known)
+        return StepBoxes(some.box, some.object_id, some.class_name, some.truncated)
 
 
-def relocalize(
-    camera: _core.Camera,
-    pose_model: _core.PoseModel,
-    objects: Objects,
-    covariances: Mapping[int, Floats],
-    boxes: CheckedBoxes,
-    box_covariance: Floats,
-) -> Relocation:
-    """Find the pose; see ``OnlineSlam.relocalize``. Covariances (9, 9) are by row of objects."""
-    row_of_id = {number: row for row, number in enumerate(objects.ids.tolist())}
-    candidates = []
-    for number, name in zip(boxes.ids, boxes.class_name, strict=True):
-        if number >= 0:
-            candidates.append([row_of_id[number]] if number in row_of_id else [])
-        else:
-            same = [row for row, other in enumerate(objects.class_names) if other == name]
-            candidates.append(same)
-    is_known = all(number >= 0 for number in boxes.ids)
-    spread = np.array([covariances.get(row, _UNKNOWN) for row in range(len(objects))])
+def relocalize(state: State, boxes: StepBoxes) -> Relocation:
+    """Find the pose; see ``OnlineSlam.relocalize``."""
+    settings, objects, checked = state.settings, read_objects(state), check_boxes(boxes)
+    known = object_covariances(state)
+    covariances = [known.get(row, _UNKNOWN_COVARIANCE) for row in state.object_rows]
+    ids, names = objects.object_ids, np.array(objects.class_names, dtype=np.str_)
+    candidates = [
+        np.flatnonzero(ids == one if one >= 0 else names == name).tolist()
+        for one, name in zip(checked.object_id.tolist(), checked.class_name, strict=True)
+    ]
+    have_ids = bool((checked.object_id >= 0).all())
     found = _core.relocalize(
-        pose_model,
-        camera,
+        settings.pose_model,
+        settings.camera,
         objects.ellipsoids,
-        spread.reshape(-1, 81),
-        boxes.box,
-        box_covariance,
-        boxes.truncated,
+        np.array(covariances).reshape(-1, 81),
+        checked.box,
+        box_noise_rows(settings.box_noise, checked.box),
+        checked.truncated,
         candidates,
-        FEWEST_KNOWN[pose_model] if is_known else FEWEST_UNKNOWN,
+        MIN_BOXES_WITH_IDS[settings.pose_model] if have_ids else MIN_BOXES_WITHOUT_IDS,
     )
-    if found.runner_up < found.chi_square + AMBIGUOUS:
+    if found.runner_up < found.chi_square + MIN_CHI2_MARGIN:
         raise ValueError(
             f"relocalize: ambiguous, {found.matches} boxes fit at "
             f"{np.round(found.pose, 2).tolist()} as well as at {np.round(found.other, 2).tolist()}"
         )
-    shown = np.append(objects.ids, -1)[found.object]
+    shown = np.append(ids, -1)[found.object]
     return Relocation(found.pose, found.covariance, shown, found.chi_square)

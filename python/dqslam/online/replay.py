@@ -11,7 +11,7 @@ import numpy as np
 from dqslam import _core
 from dqslam.online.slam import OnlineSlam
 from dqslam.online.step import Motion, Step, StepBoxes, StepPositions
-from dqslam.recording import Recording
+from dqslam.recording import Recording, RelativePositions
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +31,6 @@ def steps_of(recording: Recording) -> Iterator[Step]:
     order = np.argsort(detections.pose, kind="stable")
     begin = np.searchsorted(detections.pose[order], np.arange(count + 1))
     names = [detections.class_names[number] for number in detections.class_id.tolist()]
-    positions = recording.positions
     for pose in range(count):
         rows = order[begin[pose] : begin[pose + 1]]
         motion = None
@@ -46,24 +45,19 @@ def steps_of(recording: Recording) -> Iterator[Step]:
                 class_name=[names[row] for row in rows],
                 truncated=detections.truncated[rows],
             ),
-            positions=None if positions is None else _positions_at(positions, pose),
+            positions=_positions_at(recording.positions, pose),
         )
 
 
-def _positions_at(positions: object, pose: int) -> StepPositions | None:
-    from dqslam.recording import RelativePositions
-
-    assert isinstance(positions, RelativePositions)
-    rows = np.flatnonzero(positions.pose == pose)
-    if not rows.size:
+def _positions_at(positions: RelativePositions | None, pose: int) -> StepPositions | None:
+    if positions is None or pose not in positions.pose:
         return None
-    return StepPositions(
-        positions.object_id[rows], positions.object_in_robot[rows], positions.covariance[rows]
-    )
+    here = positions.select(positions.pose == pose)
+    return StepPositions(here.object_id, here.object_in_robot, here.covariance)
 
 
 def replay(slam: OnlineSlam, recording: Recording) -> Iterator[Frame]:
-    """Feed a recording to a session, and tell how each step went."""
+    """Feed a recording to a session, and yield how each step went."""
     for step in steps_of(recording):
         start = perf_counter()
         report = slam.add(

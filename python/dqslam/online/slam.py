@@ -1,10 +1,10 @@
-"""A session: steps in, an estimate at any time out."""
+"""A session as users have it: steps in, an estimate at any time out."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from concurrent.futures import Future
 from pathlib import Path
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,31 +14,25 @@ from dqslam._checks import Floats, Ints
 from dqslam.association import FINAL, UNSURE
 from dqslam.assumptions import BoxNoise, OdometryNoise, SizePrior, SizePriors
 from dqslam.estimate import Estimate
-from dqslam.online.identify import Identifier, NewBoxes
-from dqslam.online.inputs import PathBegin, box_noise_rows, motion_arrays, next_time, position_rows
-from dqslam.online.keyframes import Journal
-from dqslam.online.local_map import Assumptions
+from dqslam.online.identify import Identifier
+from dqslam.online.inputs import PathBegin
+from dqslam.online.keyframes import KeyframeStore
+from dqslam.online.maps import add_map, load_map, save_map
 from dqslam.online.objects import Objects, Registry
-from dqslam.online.polish import Polish, Polished, Polisher, Smoothing, Solve
+from dqslam.online.polish import Polished, Polisher, smooth_all, solve_all
+from dqslam.online.readout import read_assignments, read_estimate, read_objects
+from dqslam.online.refinement import refine_all
 from dqslam.online.relocalize import Relocation, relocalize
-from dqslam.online.step import (
-    CheckedBoxes,
-    Motion,
-    StepBoxes,
-    StepError,
-    StepPositions,
-    check_boxes,
-)
-
-_NO_FLOATS = np.zeros(0)
+from dqslam.online.state import Settings, State
+from dqslam.online.step import Motion, StepBoxes, StepPositions
+from dqslam.online.stepping import take_step
 
 
 class OnlineSlam:
     """Object SLAM step by step.
 
-    Each ``add`` does bounded work and leaves an estimate that can be used: ``pose``,
-    ``trajectory``, ``objects``. Objects have a size prior from their first box, so no state is ever
-    indeterminate.
+    Each ``add`` does bounded work and leaves an estimate that can be used: ``pose``, ``poses``,
+    ``objects``. Objects have a size prior from their first box, so no state is ever indeterminate.
 
     Parameters
     ----------
@@ -83,6 +77,8 @@ class OnlineSlam:
         estimates_noise: bool = False,
     ) -> None:
         """Begin a session without a step."""
+        if not 0.5 < trust_ids <= FINAL:
+            raise ValueError(f"trust in ids is {trust_ids:g}, not above 0.5 and at most 1")
         self.camera = camera
         self.pose_model = pose_model
         self.solve_options = _core.SolveOptions() if options is None else options
@@ -92,35 +88,28 @@ class OnlineSlam:
         if self.solve_options.loss != _core.Loss.NONE and online.loss_scale == 0.0:
             online = _with_loss(online, self.solve_options.loss_scale)
         scene = _core.ScenePriors() if scene_priors is None else scene_priors
-        self._session = _core.Session(pose_model, camera, scene, online)
-        self._registry = Registry(size_prior)
-        self._box_noise = BoxNoise() if box_noise is None else box_noise
-        self._timestamps: list[float] = []
-        self._begin = PathBegin(pose_model, first_pose, first_covariance)
-        self.shown: Ints = np.zeros(0, dtype=np.int64)
-        """Object that each box of the last step was given, -1 for one that waits; shape (b,)."""
-        self._ids: list[Ints] = []
-        self._polisher = Polisher()
-        self._map_rows = 0
-        self._map_covariance: dict[int, Floats] = {}
-        if not 0.5 < trust_ids <= FINAL:
-            raise ValueError(f"trust in ids is {trust_ids:g}, not above 0.5 and at most 1")
-        self._believes_ids = trust_ids == FINAL and not finds_movers
-        self._estimates_noise = estimates_noise
-        self._journal = Journal(size_prior)
-        assumptions = Assumptions(
-            camera,
-            pose_model,
-            self._box_noise,
-            learns_size=size_prior is None,
+        are_final = trust_ids == FINAL
+        settings = Settings(
+            camera=camera,
+            pose_model=pose_model,
+            solve_options=self.solve_options,
+            box_noise=BoxNoise() if box_noise is None else box_noise,
+            size_prior=size_prior,
+            believes_ids=are_final and not finds_movers,
+            trust=FINAL if are_final and finds_movers else min(trust_ids, UNSURE),
             estimates_noise=estimates_noise,
         )
-        trust = FINAL if trust_ids == FINAL and finds_movers else min(trust_ids, UNSURE)
-        self._identifier = Identifier(assumptions, self._journal, trust=trust)
-        if not self._believes_ids:
+        self._state = State(
+            settings,
+            PathBegin(pose_model, first_pose, first_covariance),
+            _core.Session(pose_model, camera, scene, online),
+            Registry(),
+            KeyframeStore(size_prior),
+        )
+        self._identifier = Identifier(self._state)
+        self._polisher = Polisher()
+        if not settings.believes_ids:
             import scipy.optimize  # noqa: F401, half a second that no step should take
-
-    # ------------------------------------------------------------------------------ steps
 
     def add(
         self,
@@ -149,174 +138,74 @@ class OnlineSlam:
             and boxes that are none. Nothing has changed then.
         """
         self._polisher.take()
-        count = len(self._timestamps)
-        try:
-            time = next_time(self._timestamps[-1] if count else None, timestamp)
-            checked = check_boxes(boxes)
-            relative, covariance = motion_arrays(
-                odometry,
-                None if count else self._begin,
-                self._step_covariance(),
-            )
-            shows = checked.object_id if self._believes_ids else np.full(len(checked.box), -1)
-            known = np.flatnonzero(shows >= 0)
-            ids = shows[known].tolist()
-            names = [checked.class_name[row] for row in known.tolist()]
-            rows, new = self._registry.rows(ids, names)
-            objects = np.full(len(shows), -1, dtype=np.int32)
-            objects[known] = rows
-            report = self._session.add(
-                relative,
-                covariance,
-                objects,
-                checked.box,
-                box_noise_rows(self._box_noise, checked.box),
-                checked.truncated,
-                *position_rows(positions, self._registry),
-                np.array([prior.log_mean for _, prior in new]) if new else _NO_FLOATS,
-                np.array([prior.log_sigma for _, prior in new]) if new else _NO_FLOATS,
-            )
-        except (ValueError, TypeError) as error:
-            raise StepError(f"step {count}: {error}") from None
-        self._registry.register(new)
-        for row, name in zip(rows, names, strict=True):
-            self._registry.votes[row][name] += 1
-        self._timestamps.append(time)
-        self.shown = checked.object_id
-        self._ids.append(checked.object_id)
-        if self._identifier.has_begun and count:
-            self._identifier.go_on(relative, covariance)
-        if len(ids) < len(objects):
-            unknown = np.flatnonzero(objects < 0)
-            objects[unknown] = self._identify(checked, unknown, report.first_observation)
-            names_of = self._registry.ids
-            self.shown = np.array(
-                [names_of[row] if row >= 0 else -1 for row in objects.tolist()], dtype=np.int64
-            )
-        return report
-
-    def _step_covariance(self) -> Floats | None:
-        """Return the covariance that is estimated of a step, (k, k), if it is."""
-        noise = self.odometry_noise
-        if noise is None:
-            return None
-        axes = (2, 1) if self.pose_model == _core.PoseModel.SE2 else (3, 3)
-        return np.diag(np.repeat([noise.translation_m**2, noise.rotation_rad**2], axes))
-
-    def _identify(self, boxes: CheckedBoxes, rows: Ints, first_observation: int) -> Ints:
-        """Return the rows of the objects that boxes show, -1 for none, shape (b,)."""
-        return self._identifier.look(
-            self._session,
-            self._registry,
-            self._timestamps[-1],
-            NewBoxes(
-                row=rows,
-                sight=first_observation + rows,
-                box=boxes.box[rows],
-                truncated=boxes.truncated[rows],
-                class_name=[boxes.class_name[row] for row in rows.tolist()],
-                claim=boxes.object_id[rows],
-            ),
-        )
+        return take_step(self._state, self._identifier, odometry, boxes, timestamp, positions)
 
     # ------------------------------------------------------------------------------ estimate
 
     def __len__(self) -> int:
         """Return the number of steps."""
-        return len(self._timestamps)
-
-    @property
-    def pose(self) -> Floats:
-        """world_from_robot now, shape (d,); the first pose before any step."""
-        if not self._timestamps:
-            return np.asarray(self._begin.pose)
-        return np.asarray(self._session.pose_at(len(self._timestamps) - 1))
-
-    @property
-    def trajectory(self) -> Floats:
-        """world_from_robot of every step, shape (n, d)."""
-        return self._session.poses
+        return len(self._state.timestamps)
 
     @property
     def timestamps(self) -> Floats:
         """Seconds, shape (n,)."""
-        return np.array(self._timestamps)
+        return np.array(self._state.timestamps)
 
     @property
-    def count(self) -> int:
-        """How many objects there are."""
-        return int(self._session.num_objects) - len(self._journal.hidden())
+    def pose(self) -> Floats:
+        """world_from_robot now, shape (d,); the first pose before any step."""
+        if not len(self):
+            return np.asarray(self._state.begin.pose)
+        return np.asarray(self._state.core.pose_at(len(self) - 1))
 
-    def _rows(self) -> list[int]:
-        """Return the rows of the objects that are in the map."""
-        hidden = self._journal.hidden()
-        return [row for row in range(self._session.num_objects) if row not in hidden]
+    @property
+    def poses(self) -> Floats:
+        """world_from_robot of every step, shape (n, d)."""
+        return self._state.core.poses
 
     @property
     def objects(self) -> Objects:
         """The objects as they stand."""
-        rows = self._rows()
-        names = self._registry.class_names()
-        return Objects(
-            ids=np.array([self._registry.ids[row] for row in rows], dtype=np.int64),
-            class_names=tuple(names[row] for row in rows),
-            ellipsoids=self._session.ellipsoids[rows],
-            observations=self._session.observations[rows].astype(np.int64),
-        )
+        return read_objects(self._state)
+
+    @property
+    def num_objects(self) -> int:
+        """How many objects there are."""
+        return len(self._state.object_rows)
 
     @property
     def left_out(self) -> dict[int, str]:
         """Ids of objects that do not fit a world at rest, and why; their boxes take no part."""
-        return {self._registry.ids[row]: why for row, why in self._journal.left_out.items()}
+        return self._state.left_out
+
+    @property
+    def shown(self) -> Ints:
+        """Object that each box of the last step shows, -1 for one that waits; shape (b,)."""
+        return self._state.shown
 
     @property
     def assignments(self) -> list[Ints]:
         """Which object each box of each step shows, as far as is known now; -1 for none."""
-        ids = np.array([*self._registry.ids, -1], dtype=np.int64)
-        shown = list(self._ids)
-        for step, (boxes, rows) in self._journal.shown().items():
-            shown[step] = shown[step].copy()
-            shown[step][boxes] = ids[rows]
-        return shown
+        return read_assignments(self._state)
 
     @property
     def keyframes(self) -> Ints:
-        """Steps whose boxes take part, of boxes that no id tells the object of; shape (f,)."""
-        return np.array([frame.pose for frame in self._journal.keyframes], dtype=np.int64)
+        """Steps whose boxes take part, of boxes that are identified; shape (f,)."""
+        return np.array([one.pose for one in self._state.store.keyframes], dtype=np.int64)
 
     @property
     def size_prior(self) -> SizePrior | SizePriors:
-        """What is assumed of new objects: given, or learned from those that boxes told."""
-        return self._journal.size_prior or self._registry.size_prior
+        """What is assumed of new objects: given, or learned from those that were found."""
+        return self._state.store.size_prior or self._state.prior
 
     @property
     def odometry_noise(self) -> OdometryNoise | None:
         """Of a step, where that is estimated."""
-        return self._journal.odometry_noise if self._estimates_noise else None
+        return self._state.odometry_noise
 
     def estimate(self) -> Estimate:
         """Return all of it as ``solve`` does, objects by ascending ids."""
-        objects = self.objects
-        order = np.argsort(objects.ids, kind="stable")
-        ellipsoids = objects.ellipsoids[order]
-        graph, _ = self._session.to_graph()
-        return Estimate(
-            pose_model=self.pose_model,
-            camera=self.camera,
-            timestamps=self.timestamps,
-            poses=self.trajectory,
-            initial_poses=graph.initial_poses,
-            object_ids=objects.ids[order],
-            class_names=tuple(objects.class_names[row] for row in order),
-            observations=objects.observations[order],
-            dual_quadrics=np.array(
-                [_core.dual_quadric_from_ellipsoid(one) for one in ellipsoids]
-            ).reshape(-1, 9),
-            ellipsoids=ellipsoids,
-            dropped=dict(sorted(self.left_out.items())),
-        )
-
-    # ------------------------------------------------------------------------------ polish
+        return read_estimate(self._state)
 
     def polish(self, *, background: bool = False) -> Future[Polished]:
         """Minimize all that has arrived, as ``solve`` does, from where the session stands.
@@ -326,14 +215,14 @@ class OnlineSlam:
         or boxes there is nothing to do.
         """
         self._polisher.take(wait=True)
-        return self._polisher.start(self._new_polish(), background=background)
-
-    def _new_polish(self) -> Polish:
-        if self._map_rows:
-            return Smoothing(self._session)
-        if self._identifier.has_begun:
-            return self._identifier.polish(self._session, self._registry, self.solve_options)
-        return Solve(self._session, self.solve_options)
+        state = self._state
+        if state.store.map_covariance:
+            polish = smooth_all(state.core)
+        elif state.store.keyframes:
+            polish = refine_all(state)
+        else:
+            polish = solve_all(state.core, self.solve_options)
+        return self._polisher.start(polish, background=background)
 
     # ------------------------------------------------------------------------------ maps
 
@@ -345,34 +234,11 @@ class OnlineSlam:
         ValueError
             With too few boxes of the map, when no pose explains them, or when two do.
         """
-        checked = check_boxes(boxes)
-        covariances = self._covariances()
-        rows = enumerate(self._rows())
-        return relocalize(
-            self.camera,
-            self.pose_model,
-            self.objects,
-            {place: covariances[row] for place, row in rows if row in covariances},
-            checked,
-            box_noise_rows(self._box_noise, checked.box),
-        )
-
-    def _covariances(self) -> Mapping[int, Floats]:
-        """Return the covariance (9, 9) of each row of the map that has one."""
-        from dqslam.online.maps import object_covariances
-
-        return self._map_covariance | object_covariances(
-            self._session, self.solve_options, skip=set(self._map_covariance)
-        )
+        return relocalize(self._state, boxes)
 
     def save(self, directory: str | Path) -> None:
         """Write the estimate and its covariances, as ``save_estimate`` does."""
-        from dqslam.online.maps import save_session
-
-        rows = self._rows()
-        covariances = self._covariances()
-        by_id = {self._registry.ids[row]: covariances[row] for row in rows if row in covariances}
-        save_session(self, by_id, directory)
+        save_map(self._state, directory)
 
     @classmethod
     def load(
@@ -380,22 +246,20 @@ class OnlineSlam:
         directory: str | Path,
         options: _core.SolveOptions | None = None,
         *,
-        pose_model: _core.PoseModel = _core.PoseModel.SE2,
         robot_from_camera: ArrayLike | None = None,
-        first_pose: ArrayLike | None = None,
-        first_covariance: ArrayLike | None = None,
         first_boxes: StepBoxes | None = None,
-        box_noise: BoxNoise | None = None,
-        online: _core.OnlineOptions | None = None,
-        size_prior: SizePrior | SizePriors | None = None,
-        scene_priors: _core.ScenePriors | None = None,
-        trust_ids: float = FINAL,
-        finds_movers: bool = False,
-    ) -> OnlineSlam:
+        **settings: Any,
+    ) -> Self:
         """Continue a map that was saved: its objects, with their covariances, are what is known.
 
-        Where the session begins is found from ``first_boxes``, or given; ``first_boxes`` are then
-        the first step. ``robot_from_camera`` is the mount, which no result has.
+        Parameters
+        ----------
+        robot_from_camera
+            Where the camera is on the robot, which no result has; by default they are the same.
+        first_boxes
+            The first step. Without a ``first_pose``, the session begins where they are seen from.
+        settings
+            As those of a new session.
 
         Raises
         ------
@@ -404,46 +268,16 @@ class OnlineSlam:
         ValueError
             When the boxes do not tell the pose.
         """
-        from dqslam.online.maps import load_map, with_mount
-
-        known = load_map(directory)
-        camera = with_mount(known.camera, robot_from_camera)
-        if first_boxes is not None and first_pose is None:
-            probe = cls(camera, pose_model=pose_model, box_noise=box_noise, size_prior=size_prior)
-            probe._add_map(known)
-            found = probe.relocalize(first_boxes)
-            first_pose, first_covariance = found.pose, found.covariance
-            first_boxes = found.with_ids(first_boxes)
-        slam = cls(
-            camera,
-            options,
-            online=online,
-            pose_model=pose_model,
-            first_pose=first_pose,
-            first_covariance=first_covariance,
-            box_noise=box_noise,
-            size_prior=size_prior,
-            scene_priors=scene_priors,
-            trust_ids=trust_ids,
-            finds_movers=finds_movers,
-        )
-        slam._add_map(known)
+        known = load_map(directory, robot_from_camera)
+        slam = cls(known.camera, options, **settings)
+        add_map(slam._state, known)
         if first_boxes is not None:
+            if settings.get("first_pose") is None:
+                found = slam.relocalize(first_boxes)
+                begin = PathBegin(slam.pose_model, found.pose, found.covariance)
+                slam._state.begin, first_boxes = begin, found.with_ids(first_boxes)
             slam.add(None, first_boxes)
         return slam
-
-    def _add_map(self, known: object) -> None:
-        from dqslam.online.maps import KnownMap
-
-        assert isinstance(known, KnownMap)
-        for number, name, ellipsoid, covariance in known.rows():
-            prior = self._registry.prior_of(name)
-            self._session.add_map_object(ellipsoid, covariance, prior.log_mean, prior.log_sigma)
-            self._registry.register([(number, prior)])
-            self._registry.votes[-1][name] += 1
-            self._map_covariance[len(self._registry.ids) - 1] = covariance
-            self._journal.know_map_object(len(self._registry.ids) - 1, name, covariance)
-        self._map_rows = len(self._registry.ids)
 
 
 def _with_loss(online: _core.OnlineOptions, loss_scale: float) -> _core.OnlineOptions:

@@ -65,7 +65,7 @@ def run_online(
     for frame in replay(slam, known):
         times.append(frame.milliseconds)
         show(slam, frame)
-    live = slam.trajectory
+    live = slam.poses
     polished = slam.polish().result()
     final = trust_ids == FINAL
     object_id = detections.object_id.copy()
@@ -95,7 +95,7 @@ def run_online(
 def _estimate(slam: OnlineSlam, recording: Recording) -> Estimate:
     """Return the estimate, and say of final ids without an object why that is."""
     estimate = slam.estimate()
-    ids = np.array([*slam.objects.ids, *slam.left_out], dtype=np.int64)
+    ids = np.array([*slam.objects.object_ids, *slam.left_out], dtype=np.int64)
     used = np.isin(recording.detections.pose, slam.keyframes)
     dropped = {**estimate.dropped, **not_found(recording, ids, used)}
     return replace(estimate, dropped=dict(sorted(dropped.items())))
@@ -131,4 +131,6 @@ def describe_step(slam: OnlineSlam, frame: Frame) -> str:
     """Say in a line where the robot is, how many objects it knows, and what the step took."""
     pose = slam.pose
     place = " ".join(f"{entry:.2f}" for entry in pose[: 2 if len(pose) == 3 else 3])
-    return f"step {len(slam)}: at {place} m, {slam.count} objects, {frame.milliseconds:.2f} ms"
+    return (
+        f"step {len(slam)}: at {place} m, {slam.num_objects} objects, {frame.milliseconds:.2f} ms"
+    )

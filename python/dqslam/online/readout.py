@@ -1,0 +1,52 @@
+"""What a session knows, read out: its objects, what boxes show, the whole estimate."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dqslam._checks import Ints
+from dqslam.estimate import Estimate
+from dqslam.online.objects import Objects
+from dqslam.online.state import State
+
+
+def read_objects(state: State) -> Objects:
+    """Return the objects that are in the map."""
+    rows = state.object_rows
+    votes = [state.registry.votes[row] + state.store.votes(row) for row in rows]
+    return Objects(
+        object_ids=np.array([state.registry.ids[row] for row in rows], dtype=np.int64),
+        class_names=tuple(one.most_common(1)[0][0] for one in votes),
+        observations=state.core.observations[rows].astype(np.int64),
+        ellipsoids=state.core.ellipsoids[rows],
+    )
+
+
+def read_assignments(state: State) -> list[Ints]:
+    """Return the ids that the boxes of each step show, as far as is known now; -1 for none."""
+    ids = np.array([*state.registry.ids, -1], dtype=np.int64)
+    assignments = list(state.given_ids)
+    for step, (boxes, rows) in state.store.shown().items():
+        assignments[step] = assignments[step].copy()
+        assignments[step][boxes] = ids[rows]
+    return assignments
+
+
+def read_estimate(state: State) -> Estimate:
+    """Return all of it as ``solve`` does, objects by ascending ids."""
+    objects = read_objects(state)
+    order = np.argsort(objects.object_ids, kind="stable")
+    graph, _ = state.core.to_graph()
+    return Estimate(
+        pose_model=state.settings.pose_model,
+        camera=state.settings.camera,
+        timestamps=np.array(state.timestamps),
+        poses=state.core.poses,
+        initial_poses=graph.initial_poses,
+        object_ids=objects.object_ids[order],
+        class_names=tuple(objects.class_names[row] for row in order),
+        observations=objects.observations[order],
+        dual_quadrics=objects.dual_quadrics[order],
+        ellipsoids=objects.ellipsoids[order],
+        dropped=dict(sorted(state.left_out.items())),
+    )
