@@ -11,13 +11,12 @@ using namespace pybind11::literals;
 namespace dqslam {
 
 void BindCovariance(py::module_& m) {
-  py::class_<UnderConstrained> under_constrained(
-      m, "UnderConstrained", "A parameter that neither the data nor the priors determine.");
-  py::native_enum<UnderConstrained::Kind>(under_constrained, "Kind", "enum.Enum")
-      .value("POSE", UnderConstrained::Kind::kPose)
-      .value("OBJECT", UnderConstrained::Kind::kObject)
+  py::native_enum<VariableKind>(m, "VariableKind", "enum.Enum", "What a parameter belongs to.")
+      .value("POSE", VariableKind::kPose)
+      .value("OBJECT", VariableKind::kObject)
       .finalize();
-  under_constrained
+  py::class_<UnderConstrained>(
+      m, "UnderConstrained", "A parameter that neither the data nor the priors determine.")
       .def_readonly("kind", &UnderConstrained::kind, "Whether it belongs to a pose or an object.")
       .def_readonly("row", &UnderConstrained::row, "Row of the pose or the object in the graph.")
       .def_readonly(

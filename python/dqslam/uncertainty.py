@@ -145,7 +145,7 @@ def _marginals(
 
 
 def _named(found: _core.UnderConstrained, object_ids: Ints) -> UnderConstrained:
-    if found.kind == _core.UnderConstrained.Kind.POSE:
+    if found.kind == _core.VariableKind.POSE:
         return UnderConstrained("pose", found.row, found.parameter)
     return UnderConstrained("object", int(object_ids[found.row]), found.parameter)
 

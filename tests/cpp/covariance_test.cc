@@ -79,7 +79,7 @@ TEST(ComputeCovariance, NamesAnObjectThatNothingDeterminesAndReturnsTheRest) {
   }
   const Covariance covariance = ComputeCovariance(scene.graph, SolveOptions(), scene.truth);
   ASSERT_EQ(covariance.under_constrained.size(), 1u);
-  EXPECT_EQ(covariance.under_constrained[0].kind, UnderConstrained::Kind::kObject);
+  EXPECT_EQ(covariance.under_constrained[0].kind, VariableKind::kObject);
   EXPECT_EQ(covariance.under_constrained[0].row, 2);
   EXPECT_TRUE(covariance.objects.row(2).hasNaN());
   EXPECT_TRUE(covariance.objects.row(1).allFinite());

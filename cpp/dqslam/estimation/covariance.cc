@@ -72,8 +72,8 @@ Covariance ComputeCovariance(const Graph& graph, const SolveOptions& options, co
     row = block.reshaped().transpose();
     for (int i = 0; i < size; ++i) {
       if (block(i, i) * information.matrix.coeff(offset + i, offset + i) < kUndetermined) continue;
-      using Kind = UnderConstrained::Kind;
-      covariance.under_constrained.push_back({is_pose ? Kind::kPose : Kind::kObject, of_table, i});
+      covariance.under_constrained.push_back(
+          {is_pose ? VariableKind::kPose : VariableKind::kObject, of_table, i});
       row.setConstant(std::nan(""));
       break;
     }

@@ -12,10 +12,11 @@
 
 namespace dqslam {
 
+enum class VariableKind { kPose, kObject };
+
 /// A parameter that neither the data nor the priors determine.
 struct UnderConstrained {
-  enum class Kind { kPose, kObject };
-  Kind kind;
+  VariableKind kind;
   int row;        ///< row of the pose or the object in the graph
   int parameter;  ///< index of the parameter in the tangent of that pose or object
 };
