@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from dqslam._colors import BLUE as BLUE
 from dqslam._colors import ESTIMATE as ESTIMATE
-from dqslam._colors import GREEN as GREEN
 from dqslam._colors import GRAY as GRAY
+from dqslam._colors import GREEN as GREEN
 from dqslam._colors import ODOMETRY as ODOMETRY
 from dqslam._colors import ORANGE as ORANGE
 from dqslam._colors import PURPLE as PURPLE
