@@ -1,127 +1,52 @@
-"""Estimate a real recording."""
+"""A recording estimated at once: association, a polish, and the poses between the keyframes."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dqslam import _core
-from dqslam.association import FINAL, Association, associate, fill_in
-from dqslam.assumptions import BoxNoise, OdometryNoise, SizePrior, SizePriors
+from dqslam.association import Association, associate, fill_in
 from dqslam.estimate import Estimate
-from dqslam.evaluation import common_poses
 from dqslam.graph import solve
-from dqslam.io import Trajectory
-from dqslam.pipeline.border import with_cut_edges
-from dqslam.pipeline.conclude import Outcome, RunResult, conclude
-from dqslam.pipeline.hold_out import choose_held_out
+from dqslam.pipeline.conclude import EstimatorOutput
+from dqslam.pipeline.options import Progress, RunOptions
 from dqslam.recording import Recording
 from dqslam.uncertainty import Marginals, marginal_covariances
 
 
-def perturb_odometry(
-    recording: Recording,
-    noise: OdometryNoise,
-    *,
-    seed: int,
-    believed: OdometryNoise | None = None,
-) -> Recording:
-    """Add Gaussian noise to every step, for a trajectory that is better than odometry would be.
-
-    The estimator is told the ``noise``, or what is ``believed`` of it instead.
-    """
-    odometry = recording.odometry
-    steps = len(odometry.relative)
-    sigma = np.repeat([noise.translation_m, noise.rotation_rad], 3)
-    tangent = np.random.default_rng(seed).normal(0.0, sigma, (steps, 6))
-    relative = _core.plus(odometry.pose_model, odometry.relative, tangent)
-    covariance = (believed or noise).covariance(steps)
-    return replace(recording, odometry=replace(odometry, relative=relative, covariance=covariance))
-
-
-def run(
-    recording: Recording,
-    *,
-    trust_ids: float = FINAL,
-    mode: _core.Mode = _core.Mode.SLAM,
-    reference: Trajectory | None = None,
-    box_noise: BoxNoise | None = None,
-    size_prior: SizePrior | SizePriors | None = None,
-    estimates_noise: bool = False,
-    hold_out: float = 0.0,
-    seed: int = 0,
-    progress: Callable[[float], None] = lambda share: None,
-) -> RunResult:
-    """Estimate poses and objects of a recording, and report.
-
-    Edges of boxes on the border of the image only bound the object from one side. Objects that do
-    not fit a world at rest are left out; without any, the odometry is returned as it is.
-
-    Parameters
-    ----------
-    trust_ids
-        The probability that an object id of the recording stays with its object; 1 takes them for
-        final. Boxes without an id need less than 1.
-    reference
-        The trajectory to compare with, before and after; it may be in another world frame.
-    mode
-        Whether the odometry is improved (SLAM) or taken as the truth (MAPPING).
-    box_noise, size_prior
-        What to assume; by default ``BoxNoise``, and the size that the objects found have.
-    estimates_noise
-        Whether the level of the odometry's noise is estimated instead of believed.
-    hold_out, seed
-        Share of the boxes, chosen at random, that the map is tested on instead.
-    progress
-        Is told the share of the work that is done.
-    """
-    if reference is not None:  # before the work: may they be compared?
-        common_poses(recording.timestamps, reference)
-    noise = box_noise or BoxNoise()
-    recording = with_cut_edges(recording)
-    detections = recording.detections
-    held_out = choose_held_out(len(detections), hold_out, seed=seed)
-    if isinstance(size_prior, SizePriors):
-        size_prior.check_classes(set(detections.class_names.values()))
-    known = replace(recording, detections=detections.select(~held_out))
+def estimate_batch(
+    recording: Recording, options: RunOptions, progress: Progress
+) -> EstimatorOutput:
+    """Find out which boxes show the same object, and estimate all of it together."""
     found = associate(
-        known,
-        trust=trust_ids,
-        mode=mode,
-        box_noise=noise,
-        size_prior=size_prior,
-        estimates_noise=estimates_noise,
-        progress=progress,
+        recording,
+        trust=options.trust_ids,
+        mode=options.mode,
+        box_noise=options.box_noise,
+        size_prior=options.size_prior,
+        estimates_noise=options.estimates_noise,
+        progress=lambda share: progress(share, ""),
     )
-    object_id = np.where(held_out, detections.object_id, -1)
-    object_id[~held_out] = found.object_id
-    estimate, marginals, summary = _finish(known, found, mode)
-    outcome = Outcome(
+    solver = options.solve_options()
+    solver.schedule = _core.Schedule.BATCH
+    estimate, marginals, summary = _finish(recording, found, solver)
+    tells_noise = options.estimates_noise and options.mode != _core.Mode.MAPPING
+    return EstimatorOutput(
         estimate,
         marginals,
         summary,
-        mode=mode,
+        object_id=found.object_id,
         keyframes=len(found.keyframes),
-        box_noise=noise,
         size_prior=found.scene.size_prior,
-        odometry_noise=(
-            found.scene.odometry_noise if estimates_noise and mode != _core.Mode.MAPPING else None
-        ),
-    )
-    return conclude(
-        outcome,
-        replace(detections, object_id=object_id),
-        held_out,
-        ids_are_final=trust_ids == FINAL,
-        reference=reference,
+        odometry_noise=found.scene.odometry_noise if tells_noise else None,
     )
 
 
 def _finish(
-    recording: Recording, found: Association, mode: _core.Mode
+    recording: Recording, found: Association, options: _core.SolveOptions
 ) -> tuple[Estimate, Marginals | None, _core.Summary | None]:
     """Polish what the association ends with, and fill in the poses between the keyframes."""
     odometry = recording.odometry
@@ -129,30 +54,25 @@ def _finish(
     graph = found.scene.graph()
     if graph is None:
         return _nothing(recording, path, found.left_out), None, None
-    options = _core.SolveOptions(
-        mode=mode, schedule=_core.Schedule.BATCH, loss=_core.Loss.CAUCHY, loss_scale=2.0
-    )
     solved, summary = solve(graph, options, start=found.scene.state(graph))
     ids = found.ids[solved.object_ids]
     order = np.argsort(ids)
     order = order[ids[order] >= 0]  # those without a box, now that all images are seen, are gone
     dropped = {int(found.ids[row]): why for row, why in solved.dropped.items()} | found.left_out
     dropped.pop(-1, None)
+    nothing = _nothing(recording, path, dropped)
     if not order.size:
-        return _nothing(recording, path, dropped), None, None
+        return nothing, None, None
     marginals = marginal_covariances(graph, solved, options)
     boxes = dict(zip(*np.unique(found.object_id, return_counts=True), strict=True))
     estimate = replace(
-        solved,
-        timestamps=recording.timestamps,
+        nothing,
         poses=fill_in(recording, found.keyframes, solved.poses),
-        initial_poses=path,
         object_ids=ids[order],
         class_names=tuple(solved.class_names[row] for row in order),
         observations=np.array([boxes[name] for name in ids[order]], dtype=np.int64),
         dual_quadrics=solved.dual_quadrics[order],
         ellipsoids=solved.ellipsoids[order],
-        dropped=dict(sorted(dropped.items())),
     )
     poses = np.full((len(path), *marginals.poses.shape[1:]), np.nan)
     poses[found.keyframes] = marginals.poses
