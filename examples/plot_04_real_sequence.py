@@ -17,7 +17,7 @@ import numpy as np
 
 import dqslam as dq
 from dqslam import io
-from dqslam.pipeline import perturb_odometry, run
+from dqslam.simulation import perturb_odometry
 
 folder = Path(os.environ.get("DQSLAM_REALDATA", "realdata")) / "bop_lmo"
 segment = folder / "seg_0703_1001"
@@ -53,9 +53,9 @@ print(f"{len(recording.timestamps)} views, {len(recording.detections)} boxes, no
 # %%
 # Which boxes show the same object?
 # ---------------------------------
-# ``run`` is what the command of that name calls: it finds that out along with path and map.
+# ``dq.run`` is what the command of that name calls: it finds that out along with path and map.
 
-result = run(recording, trust_ids=0.9)
+result = dq.run(recording)
 estimate = result.estimate
 for object_id, name, boxes in zip(
     estimate.object_ids, estimate.class_names, estimate.observations, strict=True

@@ -41,6 +41,11 @@ if TYPE_CHECKING:  # what type checkers see; a test holds it and the table below
     from dqslam.online import StepError as StepError
     from dqslam.online import StepPositions as StepPositions
     from dqslam.online import steps_of as steps_of
+    from dqslam.pipeline import RunFilesOptions as RunFilesOptions
+    from dqslam.pipeline import RunOptions as RunOptions
+    from dqslam.pipeline import RunResult as RunResult
+    from dqslam.pipeline import run as run
+    from dqslam.pipeline import run_files as run_files
     from dqslam.plot import plot_maps as plot_maps
     from dqslam.recording import Detections as Detections
     from dqslam.recording import Measurements as Measurements
@@ -88,6 +93,7 @@ _NAMES = {
         "StepPositions",
         "steps_of",
     ),
+    "dqslam.pipeline": ("RunFilesOptions", "RunOptions", "RunResult", "run", "run_files"),
     "dqslam.plot": ("plot_maps",),
     "dqslam.graph": ("Graph", "build_graph", "solve"),
     "dqslam.recording": (

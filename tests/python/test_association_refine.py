@@ -11,7 +11,7 @@ from dqslam.association.refine import try_refused
 from dqslam.assumptions import OdometryNoise
 from dqslam.io import load_recording
 from dqslam.metrics import position_error
-from dqslam.pipeline import perturb_odometry
+from dqslam.simulation import perturb_odometry
 
 NOISE = OdometryNoise(translation_m=0.01, rotation_rad=0.01)
 

@@ -18,7 +18,8 @@ from dqslam.evaluation import (
 )
 from dqslam.io import Trajectory, load_recording, read_trajectory
 from dqslam.metrics import align_positions, center_errors
-from dqslam.pipeline import perturb_odometry, run
+from dqslam.pipeline import run
+from dqslam.simulation import perturb_odometry
 
 
 @pytest.fixture(scope="module")

@@ -34,15 +34,6 @@ def test_frames_count_where_the_trajectory_has_no_times(tmp_path, path, boxes, e
     assert choose_frame_times(*files) is expected
 
 
-def test_given_times_go_first(tmp_path):
-    (tmp_path / "times.txt").write_text("0.5\n0.75\n")
-    times = choose_frame_times("none", "none", times=tmp_path / "times.txt")
-    assert times.table == {0: 0.5, 1: 0.75}
-    assert choose_frame_times("none", "none", rate=4).rate == 4
-    with pytest.raises(ValueError, match="--frame-times and --frame-rate both"):
-        choose_frame_times("none", "none", times=tmp_path / "times.txt", rate=4)
-
-
 def test_files_in_no_known_format_say_what_was_tried(tmp_path):
     path = tmp_path / "path.dat"
     path.write_text("1 2 3\n")

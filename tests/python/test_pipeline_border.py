@@ -10,7 +10,9 @@ from dqslam import _core
 from dqslam.assumptions import BoxNoise, SizePrior
 from dqslam.graph import build_graph, solve
 from dqslam.io import load_recording
-from dqslam.pipeline import box_chi2, cut_edges, run, with_cut_edges
+from dqslam.pipeline import RunOptions, run
+from dqslam.pipeline.border import cut_edges, with_cut_edges
+from dqslam.pipeline.report import box_chi2
 from orbit import CAMERA, NAMES, make_orbit, write_orbit
 
 
@@ -38,7 +40,7 @@ def test_edges_on_the_border_are_flagged_beside_those_that_were(files):
 
 def test_a_cut_edge_fits_when_the_object_reaches_it(files):
     recording, _ = load_recording(*files)
-    estimate = run(recording, mode=_core.Mode.MAPPING).estimate
+    estimate = run(recording, RunOptions(mode=_core.Mode.MAPPING)).estimate
     noise = BoxNoise(pixels=0.5, relative=0.0)
     left = np.tile([True, False, False, False], (len(recording.detections), 1))
     for inwards_px, is_reached in ((5.0, True), (-5.0, False)):
@@ -72,7 +74,7 @@ def test_boxes_cut_by_the_image_do_not_bend_the_map(tmp_path):
     def worst(found):
         return np.linalg.norm(found.centers - true, axis=1).max()
 
-    aware = run(recording, mode=_core.Mode.MAPPING).estimate
+    aware = run(recording, RunOptions(mode=_core.Mode.MAPPING)).estimate
     options = _core.SolveOptions(mode=_core.Mode.MAPPING, loss=_core.Loss.CAUCHY)
     prior = SizePrior(np.log(0.1), 0.7)
     blind, _ = solve(build_graph(recording, size_prior=prior), options)

@@ -8,8 +8,9 @@ import pytest
 from dqslam import _core
 from dqslam.assumptions import OdometryNoise
 from dqslam.io import load_recording
-from dqslam.pipeline import perturb_odometry, run
+from dqslam.pipeline import RunOptions, run
 from dqslam.pipeline.hold_out import choose_held_out, describe_overlap
+from dqslam.simulation import perturb_odometry
 
 NOISE = OdometryNoise(translation_m=0.01, rotation_rad=0.01)
 
@@ -33,8 +34,9 @@ def test_without_a_place_for_any_object_the_odometry_is_returned(files, trust):
     recording, _ = load_recording(*files)
     corner = np.random.default_rng(1).uniform([0, 0], [500, 400], (160, 2))
     anywhere = with_boxes(recording, box=np.hstack([corner, corner + 60.0]))
-    result = run(perturb_odometry(anywhere, NOISE, seed=0), trust_ids=trust, estimates_noise=True)
-    assert_is_odometry(result, perturb_odometry(anywhere, NOISE, seed=0))
+    noisy = perturb_odometry(anywhere, NOISE, seed=0)
+    result = run(noisy, RunOptions(trust_ids=trust, estimates_noise=True))
+    assert_is_odometry(result, noisy)
     assert result.report["reprojection"]["iou_median"] is None
     why = "no place explains its boxes, or they leave its distance open"
     names = ["101", "102", "105", "109"] if trust == 1.0 else []
@@ -45,8 +47,8 @@ def test_no_boxes_leave_the_odometry(files):
     recording, _ = load_recording(*files)
     for rows in (slice(0), recording.detections.pose == 0, recording.detections.pose == 39):
         part = with_boxes(recording, rows)
-        assert_is_odometry(run(part, trust_ids=0.9, estimates_noise=True), part)
-    held_out = run(with_boxes(recording, slice(20)), hold_out=0.99)
+        assert_is_odometry(run(part, RunOptions(trust_ids=0.9, estimates_noise=True)), part)
+    held_out = run(with_boxes(recording, slice(20)), RunOptions(hold_out=0.99))
     assert held_out.held_out.all()
     assert_is_odometry(held_out, recording)
 
@@ -65,12 +67,12 @@ def test_held_out_boxes_take_no_part(files):
     """Moved anywhere, they change nothing of the estimate."""
     recording, _ = load_recording(*files, ids="none")
     noisy = perturb_odometry(recording, NOISE, seed=0)
-    options = {"trust_ids": 0.9, "hold_out": 0.25, "seed": 3, "estimates_noise": True}
-    first = run(noisy, **options)
+    options = RunOptions(hold_out=0.25, seed=3, estimates_noise=True)
+    first = run(noisy, options)
     assert first.held_out.sum() == 40
     box = noisy.detections.box.copy()
     box[first.held_out] = [300.0, 200.0, 310.0, 210.0]
-    other = run(with_boxes(noisy, box=box), **options)
+    other = run(with_boxes(noisy, box=box), options)
     np.testing.assert_array_equal(other.held_out, first.held_out)
     np.testing.assert_array_equal(other.estimate.poses, first.estimate.poses)
     np.testing.assert_array_equal(other.estimate.ellipsoids, first.estimate.ellipsoids)
@@ -83,7 +85,7 @@ def test_held_out_boxes_take_no_part(files):
 
 def test_held_out_boxes_are_called_what_they_show(files):
     recording, _ = load_recording(*files)
-    result = run(recording, hold_out=0.25)
+    result = run(recording, RunOptions(hold_out=0.25))
     np.testing.assert_array_equal(result.detections.object_id, recording.detections.object_id)
     assert result.report["reprojection"]["held_out"]
     assert result.report["boxes"]["count"] == 120
@@ -101,7 +103,7 @@ def test_boxes_are_held_out_by_the_seed():
 @pytest.mark.parametrize("share", [-0.1, 1.0, 2.0, float("nan")])
 def test_shares_to_hold_out_must_make_sense(files, share):
     with pytest.raises(ValueError, match="the share to hold out is .*, not at least 0 and below 1"):
-        run(load_recording(*files)[0], hold_out=share)
+        run(load_recording(*files)[0], RunOptions(hold_out=share))
 
 
 def test_overlaps_are_described():

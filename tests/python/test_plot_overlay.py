@@ -39,7 +39,7 @@ def outlines(figure):
 
 def test_each_side_of_the_box_touches_the_outline(results, images):
     fits = fit_boxes(results)
-    drawn = outlines(Overlay(results, fits).draw(4, images[4]))
+    drawn = outlines(Overlay(results).draw(4, images[4]))
     touched = [one.get_xydata() for one in drawn if one.get_linestyle() == "-"]
     touched = [np.concatenate([one.min(axis=0), one.max(axis=0)]) for one in touched]
     boxes = fits.predicted[(fits.boxes.pose == 4) & (fits.object_row >= 0)]
@@ -49,10 +49,10 @@ def test_each_side_of_the_box_touches_the_outline(results, images):
 
 
 def test_an_object_without_a_box_is_dashed_and_has_no_name(results, images):
-    figure = Overlay(results, None).draw(4, images[4])
+    figure = Overlay(replace(results, boxes=None)).draw(4, images[4])
     assert {one.get_linestyle() for one in outlines(figure)} == {"--"}
     assert not figure.axes[0].texts
-    figure = Overlay(results, fit_boxes(results)).draw(4, images[4])
+    figure = Overlay(results).draw(4, images[4])
     names = sorted(one.get_text() for one in figure.axes[0].texts)
     assert names == ["book 11", "box 14", "cup 10", "lamp 12"]
 
@@ -60,7 +60,7 @@ def test_an_object_without_a_box_is_dashed_and_has_no_name(results, images):
 def test_pixels_of_the_outline_are_painted(tmp_path, results, images):
     """The leftmost point of an outline, in the file: no longer what the image was."""
     fits = fit_boxes(results)
-    (path,) = save_stills(Overlay(results, fits), {9: images[9]}, tmp_path)
+    (path,) = save_stills(Overlay(results), {9: images[9]}, tmp_path)
     pixels = np.asarray(Image.open(path).convert("RGB")).astype(int)
     assert pixels.shape == (SIZE[1], SIZE[0], 3)
     row = int(np.flatnonzero((fits.boxes.pose == 9) & (fits.boxes.object_id == 14))[0])
@@ -107,9 +107,9 @@ def test_a_lens_bends_the_outlines(results, images):
         camera.fx, camera.fy, camera.cx, camera.cy, camera.width, camera.height,
         distortion=[0.2, -0.3, 1e-3, -1e-3, 0.1],
     )  # fmt: skip
-    straight = outlines(Overlay(results, fit_boxes(results)).draw(4, images[4]))
+    straight = outlines(Overlay(results).draw(4, images[4]))
     bent = replace(results, camera=lens)
-    curved = outlines(Overlay(bent, fit_boxes(bent)).draw(4, images[4]))
+    curved = outlines(Overlay(bent).draw(4, images[4]))
     for one, other in zip(straight, curved, strict=True):
         expected = lens.distort_points(one.get_xydata())
         np.testing.assert_allclose(other.get_xydata(), expected, atol=1e-6)
@@ -118,7 +118,7 @@ def test_a_lens_bends_the_outlines(results, images):
 
 def test_stills_have_the_names_of_the_images(tmp_path, results, images):
     told = []
-    overlay = Overlay(results, fit_boxes(results))
+    overlay = Overlay(results)
     written = save_stills(overlay, images, tmp_path / "new", told.append)
     assert [path.name for path in written] == ["0000.png", "0004.png", "0009.png"]
     assert sorted(tmp_path.rglob("*.*")) == written
@@ -129,13 +129,13 @@ def test_an_image_is_never_overwritten_by_itself(tmp_path, results, images):
     image = shutil.copy(images[4], tmp_path / "0004.png")
     before = image.read_bytes()
     with pytest.raises(io.FileError, match=r"0004.png: is the image itself"):
-        save_stills(Overlay(results, None), {4: image}, tmp_path)
+        save_stills(Overlay(results), {4: image}, tmp_path)
     assert image.read_bytes() == before
 
 
 def test_a_gif_has_a_frame_for_each_image(tmp_path, results, images):
     path = tmp_path / "new" / "film.gif"
-    save_video(Overlay(results, None), images, path, rate=5.0)
+    save_video(Overlay(results), images, path, rate=5.0)
     with Image.open(path) as film:
         assert (film.n_frames, film.size, film.info["duration"]) == (3, SIZE, 200)
     assert [one.name for one in path.parent.iterdir()] == ["film.gif"]
@@ -144,7 +144,7 @@ def test_a_gif_has_a_frame_for_each_image(tmp_path, results, images):
 @pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="no ffmpeg")
 def test_an_mp4_is_one(tmp_path, results, images):
     path = tmp_path / "film.mp4"
-    save_video(Overlay(results, None), images, path, rate=5.0)
+    save_video(Overlay(results), images, path, rate=5.0)
     assert path.read_bytes()[4:8] == b"ftyp"
     assert [one.name for one in tmp_path.iterdir()] == ["film.mp4"]
 
@@ -152,9 +152,9 @@ def test_an_mp4_is_one(tmp_path, results, images):
 def test_without_ffmpeg_there_is_no_mp4(tmp_path, results, images, monkeypatch):
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(io.FileError, match=r"MP4 needs ffmpeg .*\.gif does without"):
-        save_video(Overlay(results, None), images, tmp_path / "film.mp4", rate=5.0)
+        save_video(Overlay(results), images, tmp_path / "film.mp4", rate=5.0)
     with pytest.raises(io.FileError, match=r"none of .mp4, .gif"):
-        save_video(Overlay(results, None), images, tmp_path / "film.avi", rate=5.0)
+        save_video(Overlay(results), images, tmp_path / "film.avi", rate=5.0)
 
 
 @pytest.mark.parametrize("suffix", ["gif", "mp4"])
@@ -164,7 +164,7 @@ def test_a_film_that_fails_half_way_is_not_there(tmp_path, results, images, suff
     Image.new("RGB", (10, 20)).save(tmp_path / "small.png")
     mixed = images | {12: tmp_path / "small.png"}
     with pytest.raises(io.FileError, match=r"small.png: is 10 x 20, but the camera's are"):
-        save_video(Overlay(results, None), mixed, tmp_path / f"film.{suffix}", rate=5.0)
+        save_video(Overlay(results), mixed, tmp_path / f"film.{suffix}", rate=5.0)
     assert [path.name for path in tmp_path.iterdir()] == ["small.png"]
 
 
@@ -172,12 +172,12 @@ def test_what_is_no_image_is_named(tmp_path, results):
     path = tmp_path / "0001.png"
     path.write_text("no image")
     with pytest.raises(io.FileError, match=r"0001.png: cannot be read as an image"):
-        Overlay(results, None).draw(1, path)
+        Overlay(results).draw(1, path)
 
 
 def test_a_grey_image_stays_grey(tmp_path, results):
     Image.new("L", SIZE, 77).save(tmp_path / "gray.png")
-    (path,) = save_stills(Overlay(results, None), {0: tmp_path / "gray.png"}, tmp_path / "out")
+    (path,) = save_stills(Overlay(results), {0: tmp_path / "gray.png"}, tmp_path / "out")
     pixels = np.asarray(Image.open(path).convert("RGB"))
     np.testing.assert_array_equal(pixels[2, 2], [77, 77, 77])
 

@@ -12,9 +12,9 @@ from dqslam.studies.ablation import (
     CLEAN_VARIANTS,
     ROBUST_VARIANTS,
     VARIANTS,
-    Outcome,
-    Trial,
+    AblationTrial,
     Variant,
+    VariantSolve,
     run_ablation,
     tabulate,
 )
@@ -71,13 +71,13 @@ def test_a_back_end_makes_up_for_wrong_ids():
     assert gnc.error_over_bound < 1.3 * told.error_over_bound
 
 
-def outcome(error, reached=True, failure=""):
-    return Outcome(reached, np.nan if failure else error, 2.0, 10, 0.5, failure)
+def solved(error, reached=True, failure=""):
+    return VariantSolve(reached, np.nan if failure else error, 2.0, 10, 0.5, failure)
 
 
 def test_table_by_hand(tmp_path):
-    first = Trial(3, {OURS: outcome(2.0), PAPERS: outcome(8.0, False)})
-    second = Trial(4, {OURS: outcome(4.0), PAPERS: outcome(0.0, False, "ValueError: no")})
+    first = AblationTrial(3, {OURS: solved(2.0), PAPERS: solved(8.0, False)})
+    second = AblationTrial(4, {OURS: solved(4.0), PAPERS: solved(0.0, False, "ValueError: no")})
     table = tabulate([first, second])
     ours, papers = table.rows
     assert (ours.optimum_rate, ours.error_over_bound, ours.median_error_over_bound) == (1, 1.5, 1.5)
@@ -105,7 +105,7 @@ def test_table_by_hand(tmp_path):
 
 
 def test_where_all_trials_failed_there_is_no_error(tmp_path):
-    table = tabulate([Trial(0, {OURS: outcome(1.0, False, "RuntimeError: no")})])
+    table = tabulate([AblationTrial(0, {OURS: solved(1.0, False, "RuntimeError: no")})])
     assert np.isnan(table.rows[0].error_over_bound)
     table.save(tmp_path / "ablation.json")
     assert (

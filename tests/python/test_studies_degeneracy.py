@@ -10,8 +10,8 @@ from dqslam.studies.degeneracy import (
     ESTIMATORS,
     MOTIONS,
     STARTS,
-    Outcome,
-    Trial,
+    DegeneracyTrial,
+    ObjectSolve,
     method_options,
     observe,
     run_degeneracy,
@@ -92,11 +92,11 @@ def test_the_methods_are_the_papers_and_ours():
 
 def trial(motion, *errors):
     """Two methods; the second converges only where its error is below 1 m."""
-    outcomes = {
-        (motion, "paper", "SVD"): Outcome(True, errors[0], False),
-        (motion, "dqslam", "SVD"): Outcome(errors[1] < 1.0, errors[1], True),
+    solves = {
+        (motion, "paper", "SVD"): ObjectSolve(True, errors[0], False),
+        (motion, "dqslam", "SVD"): ObjectSolve(errors[1] < 1.0, errors[1], True),
     }
-    return Trial(outcomes, {name: np.full(10, errors[0]) for name in MOTIONS})
+    return DegeneracyTrial(solves, {name: np.full(10, errors[0]) for name in MOTIONS})
 
 
 def test_table_by_hand():

@@ -9,10 +9,10 @@ from dqslam import BoxNoise, SizePrior, SolveOptions, _core, load_scenario, simu
 from dqslam.metrics import Report, evaluate
 from dqslam.studies.paper import (
     Beliefs,
-    Outcome,
+    PaperTrial,
+    ScoredSolve,
     Settings,
     Statistics,
-    Trial,
     beliefs,
     example_maps,
     method_options,
@@ -34,19 +34,21 @@ def report(error):
 
 
 def trial(seed, *errors):
-    """One outcome per error; None is a failure. Relative positions halve the error."""
-    return Trial(
+    """One solve per error; None is a failure. Relative positions halve the error."""
+    return PaperTrial(
         seed,
         odometry_rmse_pos=10.0 + seed,
-        outcomes={
-            "monocular": tuple(outcome(error) for error in errors),
-            "relative_position": tuple(outcome(error and error / 2.0) for error in errors),
+        solves={
+            "monocular": tuple(solved(error) for error in errors),
+            "relative_position": tuple(solved(error and error / 2.0) for error in errors),
         },
     )
 
 
-def outcome(error):
-    return Outcome(None, 9.0, "ValueError: no") if error is None else Outcome(report(error), 1.0)
+def solved(error):
+    if error is None:
+        return ScoredSolve(None, 9.0, "ValueError: no")
+    return ScoredSolve(report(error), 1.0)
 
 
 def with_sigmas(monkeypatch, *sigmas):
@@ -106,14 +108,14 @@ def test_scores_by_hand():
     """Efficiency is mean error / mean bound; the intervals are those of 6 degrees of freedom."""
     bounds = [BoundScore(0.5, 1.0, 0.8, 3, 2.0, True), BoundScore(1.5, 2.0, 1.6, 3, 1.0, False)]
     robust = [RobustScore(1.0, 0.8, 0.3, 0.1, 1), RobustScore(0.9, 0.6, 0.5, 0.4, 2)]
-    outcomes = [
-        Outcome(report(error), 1.0, bound=bound, robust=one)
+    solves = [
+        ScoredSolve(report(error), 1.0, bound=bound, robust=one)
         for error, bound, one in zip((1.0, 2.0), bounds, robust, strict=True)
     ]
-    outcomes.append(Outcome(None, 1.0, "ValueError: no"))
+    solves.append(ScoredSolve(None, 1.0, "ValueError: no"))
     trials = [
-        Trial(seed, 5.0, {"monocular": (one,), "relative_position": (one,)})
-        for seed, one in enumerate(outcomes)
+        PaperTrial(seed, 5.0, {"monocular": (one,), "relative_position": (one,)})
+        for seed, one in enumerate(solves)
     ]
     row = tabulate(trials, PAPER, Settings(bound=True)).as_dict()["monocular"]
     assert row["efficiency"] == pytest.approx(1.5 / 1.0)

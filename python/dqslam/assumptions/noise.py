@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dqslam._checks import Floats
+from dqslam._core import PoseModel
 
 # Odometry outside of this is exact or worthless, and squares badly.
 SIGMAS = (1e-9, 1e6)
@@ -50,7 +51,8 @@ class OdometryNoise:
                     f"{SIGMAS[0]:g} and {SIGMAS[1]:g}"
                 )
 
-    def covariance(self, steps: int) -> Floats:
-        """Repeat the covariance of a step, translation first: shape (steps, 6, 6)."""
-        variance = np.repeat([self.translation_m**2, self.rotation_rad**2], 3)
+    def covariance(self, steps: int, pose_model: PoseModel = PoseModel.SE3) -> Floats:
+        """Repeat the covariance of a step, translation first: shape (steps, k, k)."""
+        axes = (2, 1) if pose_model == PoseModel.SE2 else (3, 3)
+        variance = np.repeat([self.translation_m**2, self.rotation_rad**2], axes)
         return np.tile(np.diag(variance), (steps, 1, 1))

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from dqslam.cli.options import FrameRate, FrameTimesFile
+from dqslam.cli.options import FrameRate, FrameTimesFile, given_frame_times
 from dqslam.cli.output import Json, Output, Quiet
 from dqslam.cli.settings import ConfigFile
 
@@ -54,14 +54,9 @@ def convert(
     if camera is not None:
         lens = io.read_camera(camera)
         size = (lens.width, lens.height)
-    if frame_times is not None and frame_rate is not None:
-        raise ValueError("--frame-times and --frame-rate both say when a frame was taken")
-    frames = None if frame_times is None else io.read_frame_times(frame_times)
-    if frame_rate is not None:
-        frames = io.frame_rate(frame_rate)
     context = io.ConvertContext(
         size=size,
-        frames=frames,
+        frames=given_frame_times(frame_times, frame_rate),
         classes=None if classes is None else io.read_class_names(classes),
         body_from_camera=None if camera_in_body is None else io.read_mount(camera_in_body),
     )

@@ -4,9 +4,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from dqslam._files import results_directory
 from dqslam.cli.options import FirstSeed, ResultDirectory
 from dqslam.cli.output import Json, Output, Quiet
-from dqslam.cli.results import results_directory, save_study
+from dqslam.cli.results import save_study
 from dqslam.cli.settings import ConfigFile
 
 if TYPE_CHECKING:

@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from dqslam._files import uninterrupted
 from dqslam.cli.output import Json, Output, Quiet
-from dqslam.cli.results import uninterrupted
 from dqslam.cli.settings import ConfigFile, save_settings
 
 if TYPE_CHECKING:

@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from dqslam.io import Results, Trajectory, TrueObjects
 
 GROUNDTRUTH, OBJECTS = "groundtruth.txt", "objects.csv"
 
@@ -27,3 +31,18 @@ def truth_of(
     if objects is None and (found / OBJECTS).is_file():
         objects = found / OBJECTS
     return found / GROUNDTRUTH, objects
+
+
+def read_with_truth(
+    directory: Path, groundtruth: Path | None, objects: Path | None
+) -> tuple[Results, Trajectory | None, TrueObjects | None]:
+    """Read results and what is true of them, as far as there is any."""
+    from dqslam import io
+
+    results = io.load_results(results_in(directory))
+    groundtruth, objects = truth_of(results.directory, groundtruth, objects)
+    return (
+        results,
+        None if groundtruth is None else io.read_trajectory(groundtruth, repeated_times=True),
+        None if objects is None else io.read_true_objects(objects),
+    )

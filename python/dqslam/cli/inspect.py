@@ -12,6 +12,7 @@ from dqslam.cli.options import (
     FrameTimesFile,
     MaxTimeDifference,
     OdometryFile,
+    given_frame_times,
 )
 from dqslam.cli.output import Json, Output, Quiet
 from dqslam.cli.settings import ConfigFile
@@ -55,9 +56,8 @@ def inspect(
     output = Output(quiet=quiet, as_json=json)
     names = io.split_formats(formats or [])
     with output.steps("inspecting", 3) as done:
-        frames = io.choose_frame_times(
-            odometry, detections, names, times=frame_times, rate=frame_rate
-        )
+        frames = given_frame_times(frame_times, frame_rate)
+        frames = frames or io.choose_frame_times(odometry, detections, names)
         lens = io.read_camera(camera, names.camera)
         path = io.read_trajectory(odometry, names.trajectory, frames=frames)
         done()

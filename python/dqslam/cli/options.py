@@ -1,9 +1,12 @@
 """Options that several commands share: the files of a recording, results, trials."""
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
+
+if TYPE_CHECKING:
+    from dqslam.io import FrameTimes
 
 CameraFile = Annotated[Path, typer.Option(help="Camera: JSON, TOML, ROS, COLMAP, KITTI, bag.")]
 OdometryFile = Annotated[Path, typer.Option(help="Trajectory: TUM, KITTI, EuRoC, bag.")]
@@ -62,3 +65,14 @@ Alignment = Annotated[
     Literal["se3", "sim3", "se2", "none"],
     typer.Option(help="Motion between both worlds: rigid, with scale, on the plane."),
 ]
+
+
+def given_frame_times(table: Path | None, rate: float | None) -> "FrameTimes | None":
+    """Return the times of frames that these two options give, if one of them is given."""
+    from dqslam import io
+
+    if table is not None and rate is not None:
+        raise ValueError("--frame-times and --frame-rate both say when a frame was taken")
+    if table is not None:
+        return io.read_frame_times(table)
+    return None if rate is None else io.frame_rate(rate)

@@ -5,9 +5,10 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from dqslam._files import results_directory, uninterrupted
 from dqslam.cli.options import BackendName, FirstSeed, Jobs, ResultDirectory, Scheduler
 from dqslam.cli.output import Json, Output, Quiet
-from dqslam.cli.results import draw_figure, results_directory, uninterrupted
+from dqslam.cli.results import draw_figure
 from dqslam.cli.settings import CONFIG, ConfigFile, save_settings
 
 if TYPE_CHECKING:

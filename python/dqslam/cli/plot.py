@@ -8,14 +8,21 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from dqslam.cli.found import results_in, truth_of
-from dqslam.cli.options import Alignment, FrameRate, FrameTimesFile, TrueObjectsFile, TruthFile
+from dqslam._files import results_directory
+from dqslam.cli.found import read_with_truth
+from dqslam.cli.options import (
+    Alignment,
+    FrameRate,
+    FrameTimesFile,
+    TrueObjectsFile,
+    TruthFile,
+    given_frame_times,
+)
 from dqslam.cli.output import Json, Output, Quiet
-from dqslam.cli.results import results_directory
 from dqslam.cli.settings import ConfigFile, save_settings
 
 if TYPE_CHECKING:
-    from dqslam.io import FrameTimes, Results
+    from dqslam.io import Results
 
 _STILLS = 9  # spread evenly, where no frames are asked for
 
@@ -82,6 +89,7 @@ def plot(
     each figure shows. Writes its options, plot.toml, beside them.
     """
     from dqslam import io
+    from dqslam.plot import plot_results
 
     if find_spec("matplotlib") is None:
         raise ValueError("figures need matplotlib: pip install 'dqslam[plot]'")
@@ -99,17 +107,24 @@ def plot(
     else:
         if parameter is not None:
             raise ValueError(f"--parameter is of a sweep, which {directory} is not")
-        results = io.load_results(results_in(directory))
-        groundtruth, objects = truth_of(results.directory, groundtruth, objects)
+        results, truth, true_objects = read_with_truth(directory, groundtruth, objects)
         shown: dict[int, Path] = {}
         if images is not None:  # before anything is written: can they be told apart?
-            times = _frame_times(frame_times, frame_rate)
+            times = given_frame_times(frame_times, frame_rate)
             shown = _choose(
                 frames, io.find_images(images, results.timestamps, times), is_film=video is not None
             )
-        files, left_out = _plot_results(
-            results, out, kind, output, groundtruth=groundtruth, objects=objects, align=align
-        )
+        with output.share("drawing") as progress, results_directory(out):
+            drawn = plot_results(
+                results,
+                out,
+                kind=kind,
+                groundtruth=truth,
+                objects=true_objects,
+                align=align,
+                progress=progress,
+            )
+        files, left_out = list(drawn.written), drawn.left_out
         if images is not None:
             files += _overlay(results, shown, out, video, video_rate, output)
     save_settings(context, out / "plot.toml")
@@ -124,16 +139,6 @@ def _is_sweep(directory: Path) -> bool:
     return (directory / "summary.json").is_file() and not (directory / "trajectory.txt").exists()
 
 
-def _frame_times(table: Path | None, rate: float | None) -> FrameTimes | None:
-    from dqslam import io
-
-    if table is not None and rate is not None:
-        raise ValueError("--frame-times and --frame-rate both say when a frame was taken")
-    if table is not None:
-        return io.read_frame_times(table)
-    return None if rate is None else io.frame_rate(rate)
-
-
 def _plot_sweep(
     directory: Path, out: Path, kind: str, parameter: str | None, output: Output
 ) -> Path:
@@ -146,34 +151,6 @@ def _plot_sweep(
     return path
 
 
-def _plot_results(
-    results: Results,
-    out: Path,
-    kind: str,
-    output: Output,
-    *,
-    groundtruth: Path | None,
-    objects: Path | None,
-    align: Literal["se3", "sim3", "se2", "none"],
-) -> tuple[list[Path], dict[str, str]]:
-    from dqslam import io
-    from dqslam.plot import plot_results
-
-    truth = None if groundtruth is None else io.read_trajectory(groundtruth, repeated_times=True)
-    true_objects = None if objects is None else io.read_true_objects(objects)
-    with output.share("drawing") as progress, results_directory(out):
-        drawn = plot_results(
-            results,
-            out,
-            kind=kind,
-            groundtruth=truth,
-            objects=true_objects,
-            align=align,
-            progress=progress,
-        )
-    return list(drawn.written), dict(drawn.left_out)
-
-
 def _overlay(
     results: Results,
     images: dict[int, Path],
@@ -183,14 +160,12 @@ def _overlay(
     output: Output,
 ) -> list[Path]:
     """Write images, by their poses, with what the map has of them: the files."""
-    from dqslam.evaluation import fit_boxes
-    from dqslam.plot.overlay import Overlay, save_stills, save_video, usual_rate
+    from dqslam.plot.overlay import Overlay, save_stills, save_video
 
-    overlay = Overlay(results, None if results.boxes is None else fit_boxes(results))
+    overlay = Overlay(results)
     with output.share("images") as progress:
         if video is None:
             return save_stills(overlay, images, out / "images", progress)
-        rate = usual_rate(results.timestamps[list(images)]) if rate is None else rate
         save_video(overlay, images, video, rate=rate, progress=progress)
     return [video]
 

@@ -1,17 +1,15 @@
-"""Where a command writes: the directory of its results, all of them or none."""
+"""Figures and studies into the directory of a command's results."""
 
 from __future__ import annotations
 
-import signal
-import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
 import typer
 
+from dqslam._files import uninterrupted
 from dqslam.cli.settings import CONFIG, save_settings
 
 if TYPE_CHECKING:
@@ -26,37 +24,6 @@ class Table(Protocol):
 
 
 SomeTable = TypeVar("SomeTable", bound=Table)
-
-
-@contextmanager
-def results_directory(path: Path) -> Iterator[None]:
-    """Make a directory before the work is done; if that fails, leave none that is empty."""
-    missing = [one for one in (path, *path.parents) if not one.exists()]
-    path.mkdir(parents=True, exist_ok=True)
-    try:
-        yield
-    except BaseException:
-        with suppress(OSError):  # it is not empty
-            for one in missing:
-                one.rmdir()
-        raise
-
-
-@contextmanager
-def uninterrupted() -> Iterator[None]:
-    """Put off Ctrl-C until all files of a result are there, which belong together."""
-    in_main = threading.current_thread() is threading.main_thread()
-    if not in_main or signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
-        yield
-        return
-    asked: list[int] = []
-    before = signal.signal(signal.SIGINT, lambda number, _: asked.append(number))
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
-    if asked:
-        raise KeyboardInterrupt
 
 
 def draw_figure(output: Output, path: Path, draw: Callable[[Path], None]) -> None:

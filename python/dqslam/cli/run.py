@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -17,15 +16,14 @@ from dqslam.cli.options import (
     MaxTimeDifference,
     OdometryFile,
     ResultDirectory,
+    given_frame_times,
 )
 from dqslam.cli.output import Json, Output, Quiet
-from dqslam.cli.results import results_directory, uninterrupted
 from dqslam.cli.run_tables import show_report
-from dqslam.cli.settings import CONFIG, ConfigFile, save_settings
+from dqslam.cli.settings import CONFIG, ConfigFile, settings_text
 
 if TYPE_CHECKING:
     from dqslam.assumptions import OdometryNoise
-    from dqslam.pipeline import RunResult
 
 NOISE = "translation=0.02,rotation=0.01"
 
@@ -111,102 +109,51 @@ def run(
     Writes trajectory.txt, odometry.txt (what it started from), map.json, boxes.csv, camera.json,
     report.json and config.toml.
     """
-    from dqslam import _core, io, pipeline
-    from dqslam.association import FINAL, UNSURE
+    from dqslam import _core, io
     from dqslam.assumptions import load_size_priors
+    from dqslam.pipeline import RunFilesOptions, run_files
 
-    sizes = None if size_priors is None else load_size_priors(size_priors)
     added = parse_noise("--perturb-odometry", perturb_odometry)
-    believed = parse_noise("--odometry-noise", odometry_noise) or added
-    if odometry_covariance is not None and believed is not None:
+    believed = parse_noise("--odometry-noise", odometry_noise)
+    if odometry_covariance is not None and (added or believed):
         raise ValueError("--odometry-covariance: the noise is given already, by another option")
     if online and mode == "mapping":
         raise ValueError("--online: does not go with --mode mapping")
-    final = trust_ids == FINAL and ids != "none"
-    names = io.split_formats(formats or [])
-    frames = io.choose_frame_times(odometry, detections, names, times=frame_times, rate=frame_rate)
-    reference, reference_name = None, None
-    if groundtruth is not None:
-        reference, reference_name = io.read_trajectory(groundtruth, repeated_times=True), "file"
-    elif added is not None:
-        reference = io.read_trajectory(odometry, names.trajectory, frames=frames)
-        reference_name = "odometry before the added noise"
-    how: dict[str, Any] = {
-        "trust_ids": FINAL if final else min(trust_ids, UNSURE),
-        "reference": reference,
-        "size_prior": sizes,
-        "estimates_noise": believed is None and odometry_covariance is None,
-        "hold_out": hold_out,
-        "seed": seed,
-    }
+    options = RunFilesOptions(
+        ids=ids,
+        trust_ids=trust_ids,
+        mode=_core.Mode[mode.upper()],
+        size_prior=None if size_priors is None else load_size_priors(size_priors),
+        hold_out=hold_out,
+        seed=seed,
+        min_score=min_score,
+        formats=io.split_formats(formats or []),
+        frames=given_frame_times(frame_times, frame_rate),
+        max_time_difference=max_time_difference,
+        added_noise=added,
+        odometry_noise=believed,
+        odometry_covariance=odometry_covariance,
+    )
     output = Output(quiet=quiet, as_json=json)
-    with results_directory(out), _progress(output, online=online) as progress:
-        recording, dropped = io.load_recording(
+    # Of a session a line says what happens, else a bar the share that is done.
+    shown: AbstractContextManager[Callable[[Any], None]] = (
+        output.live("loading") if online else output.share("estimating")
+    )
+    with shown as show:
+        result = run_files(
             camera,
             odometry,
             detections,
-            min_score=min_score,
-            ids=ids,
-            final_ids=final,
-            max_time_difference=max_time_difference,
-            odometry_noise=believed,
-            odometry_covariance=odometry_covariance,
-            formats=names,
-            frames=frames,
+            options,
+            online=online,
+            groundtruth=groundtruth,
+            out=out,
+            beside={CONFIG: settings_text(context)},
+            progress=lambda share, text: show(text if online else share),
         )
-        if added is not None:
-            recording = pipeline.perturb_odometry(recording, added, seed=seed, believed=believed)
-        if online:
-            from dqslam.pipeline.online import describe_step, run_online
-
-            result = run_online(
-                recording,
-                show=lambda slam, frame: progress(describe_step(slam, frame)),
-                **how,
-            )
-        else:
-            result = pipeline.run(
-                recording, mode=_core.Mode[mode.upper()], progress=progress, **how
-            )
-    report = {
-        "camera": str(camera),
-        "odometry": str(odometry),
-        "detections": str(detections),
-        "groundtruth": None if groundtruth is None else str(groundtruth),
-        "min_score": min_score,
-        "ids": ids,
-        "trust_ids": None if ids == "none" else trust_ids,
-        "odometry_noise_added": None if added is None else asdict(added) | {"seed": seed},
-        "odometry_noise_believed": None if believed is None else asdict(believed),
-        "odometry_covariance": None if odometry_covariance is None else str(odometry_covariance),
-        "dropped_boxes": asdict(dropped),
-        "reference": reference_name,
-        **result.report,
-    }
-    _write(context, out, result, report)
-    output.document(report)
-    show_report(output, report)
+    output.document(result.report)
+    show_report(output, result.report)
     output.line(f"wrote {out}")
-
-
-def _write(context: typer.Context, out: Path, result: "RunResult", report: dict[str, Any]) -> None:
-    from dqslam import io
-
-    with uninterrupted():
-        io.save_estimate(
-            result.estimate,
-            out,
-            detections=result.detections,
-            held_out=result.held_out,
-            marginals=result.marginals,
-        )
-        io.write_json(out / "report.json", report)
-        save_settings(context, out / CONFIG)
-
-
-def _progress(output: Output, *, online: bool) -> AbstractContextManager[Callable[[Any], None]]:
-    """Show a line that is told what happens, or a bar that is told the share that is done."""
-    return output.live("loading") if online else output.share("estimating")
 
 
 def parse_noise(option: str, text: str | None) -> "OdometryNoise | None":

@@ -22,6 +22,7 @@ from typing import (
 
 import typer
 
+from dqslam._files import write_text
 from dqslam._version import version
 
 if TYPE_CHECKING:
@@ -61,17 +62,21 @@ ConfigFile = Annotated[
 
 
 def save_settings(context: typer.Context, path: Path) -> None:
-    """Write all options as they are in force to a file for `--config`.
+    """Write all options as they are in force to a file for `--config`."""
+    write_text(path, settings_text(context))
+
+
+def settings_text(context: typer.Context) -> str:
+    """Return all options as they are in force, as TOML for `--config`.
 
     Without those that are unset: what they default to may depend on the machine or the files.
     """
-    from dqslam._files import write_text
     from dqslam.config import toml_text
 
     settings: dict[str, Any] = {"command": context.info_name, "dqslam_version": version()}
     for key, name in setting_names(context.command).items():
         settings[key] = _plain(context.params[name])
-    write_text(path, toml_text(settings))
+    return toml_text(settings)
 
 
 def setting_names(command: Any) -> dict[str, str]:

@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from dqslam._files import results_directory, uninterrupted, write_text
 from dqslam.cli.options import ResultDirectory
 from dqslam.cli.output import Json, Output, Quiet
-from dqslam.cli.results import results_directory, uninterrupted
 from dqslam.cli.settings import CONFIG, ConfigFile, save_settings
 
 if TYPE_CHECKING:
@@ -36,7 +36,6 @@ def simulate(
     objects.csv and true_boxes.csv; run.toml and evaluate.toml for --config of these commands.
     """
     from dqslam import io
-    from dqslam._files import write_text
     from dqslam.config import toml_text
     from dqslam.simulation.scenario import load_scenario
     from dqslam.simulation.simulator import simulate

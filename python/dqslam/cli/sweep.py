@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from dqslam._files import read_text, uninterrupted, write_text
 from dqslam.cli.options import BackendName, Jobs, ResultDirectory, Scheduler
 from dqslam.cli.output import Json, Output, Quiet
-from dqslam.cli.results import uninterrupted
 from dqslam.cli.settings import CONFIG, ConfigFile, save_settings
 
 if TYPE_CHECKING:
@@ -38,7 +38,6 @@ def sweep(
     trial, results.parquet where pyarrow is installed, summary.json, sweep.toml, the
     file, and config.toml.
     """
-    from dqslam._files import read_text, write_text
     from dqslam.studies.sweep import load_sweep, run_sweep
 
     asked = load_sweep(file)

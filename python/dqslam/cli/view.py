@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dqslam.cli.found import results_in, truth_of
+from dqslam.cli.found import read_with_truth
 from dqslam.cli.options import Alignment, TrueObjectsFile, TruthFile
 from dqslam.cli.output import Json, Output, Quiet
 from dqslam.cli.settings import ConfigFile, save_settings
@@ -55,16 +55,8 @@ def view(
 
     output = Output(quiet=quiet, as_json=json)
     with output.waiting("reading"):
-        results = io.load_results(results_in(directory))
-        groundtruth, objects = truth_of(results.directory, groundtruth, objects)
-        scene = build_scene(
-            results,
-            groundtruth=None
-            if groundtruth is None
-            else io.read_trajectory(groundtruth, repeated_times=True),
-            objects=None if objects is None else io.read_true_objects(objects),
-            align=align,
-        )
+        results, truth, true_objects = read_with_truth(directory, groundtruth, objects)
+        scene = build_scene(results, groundtruth=truth, objects=true_objects, align=align)
     written: dict[str, str] = {}
     if export is not None:
         written["page"] = str(write_page(scene, export))

@@ -12,3 +12,4 @@ from dqslam.evaluation.fits import fit_boxes as fit_boxes
 from dqslam.evaluation.objects import judge_objects as judge_objects
 from dqslam.evaluation.trajectory import common_poses as common_poses
 from dqslam.evaluation.trajectory import judge_trajectory as judge_trajectory
+from dqslam.evaluation.trajectory import trajectory_error as trajectory_error

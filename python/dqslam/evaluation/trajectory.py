@@ -7,12 +7,15 @@ from typing import Any, Literal
 
 import numpy as np
 
+from dqslam import _core
 from dqslam._checks import Floats, Ints
+from dqslam.estimate import Estimate
 from dqslam.io import Trajectory, nearest_pose
 from dqslam.metrics import (
     Align,
     absolute_trajectory_error,
     align_positions,
+    mean_distance,
     relative_pose_error,
 )
 
@@ -70,6 +73,36 @@ def judge_trajectory(
     if align == "sim3":
         ate["scale"] = alignment.scale
     return ate, {"delta": rpe_delta, "unit": rpe_unit, **asdict(relative)}
+
+
+def trajectory_error(
+    estimate: Estimate, reference: Trajectory, *, live_poses: Floats | None = None
+) -> dict[str, Any]:
+    """Compare the poses before and after with a reference, at the times that both have.
+
+    And those of a session before its last polish, world_from_robot, shape (n, d). ``ate_rmse_m`` is
+    after rigid alignment; ``mean_m`` is the mean distance with the first common pose made equal,
+    the paper's RMSE_pos.
+    """
+    common, row = common_poses(estimate.timestamps, reference)
+    true = reference.world_from_camera[row]
+
+    def error(poses: Floats) -> dict[str, float]:
+        cameras = _core.world_from_camera(estimate.pose_model, estimate.camera, poses)[common]
+        aligned = absolute_trajectory_error(cameras[:, :3], true[:, :3])
+        moved = _start_at(true[0], cameras)
+        return {"ate_rmse_m": aligned.rmse, "mean_m": mean_distance(moved[:, :3], true[:, :3])}
+
+    paths = {"before": estimate.initial_poses, "after": estimate.poses, "live": live_poses}
+    errors = {name: error(poses) for name, poses in paths.items() if poses is not None}
+    return {"poses": len(common)} | errors
+
+
+def _start_at(first: Floats, poses: Floats) -> Floats:
+    """Move a path (n, 7) as a whole so that it starts at a given pose (7,)."""
+    se3 = _core.PoseModel.SE3
+    first_from_path = _core.between(se3, np.repeat(poses[:1], len(poses), axis=0), poses)
+    return _core.compose(se3, np.repeat(first[None], len(poses), axis=0), first_from_path)
 
 
 def _interval(times: Floats) -> float:

@@ -10,7 +10,7 @@ from dqslam.io.camera import CAMERA_FORMATS
 from dqslam.io.detections import DETECTION_FORMATS
 from dqslam.io.files import FileError, read_rows, read_text
 from dqslam.io.formats import choose_format, look_at
-from dqslam.io.frames import BY_NUMBER, FrameTimes, frame_rate, read_frame_times
+from dqslam.io.frames import BY_NUMBER, FrameTimes
 from dqslam.io.rosbag import looks_like_bag
 from dqslam.io.trajectory import TRAJECTORY_FORMATS
 
@@ -62,22 +62,12 @@ def choose_frame_times(
     odometry: str | Path,
     detections: str | Path,
     formats: FormatNames = BY_LOOK,
-    *,
-    times: str | Path | None = None,
-    rate: float | None = None,
 ) -> FrameTimes | None:
-    """Tell the times of frames for the readers of a trajectory and of boxes.
+    """Tell the times of frames for the readers of a trajectory and of boxes, where none are given.
 
-    They are those of the file ``times``, or of ``rate`` Hz. Else, where the trajectory counts
-    frames, the frame's number is its time for both. Else None: the files have times of their own,
-    or their readers say that they need them.
+    Where the trajectory counts frames, the frame's number is its time for both. Else None: the
+    files have times of their own, or their readers say that they need them.
     """
-    if times is not None and rate is not None:
-        raise ValueError("--frame-times and --frame-rate both say when a frame was taken")
-    if times is not None:
-        return read_frame_times(times)
-    if rate is not None:
-        return frame_rate(rate)
     path = choose_format(odometry, formats.trajectory, TRAJECTORY_FORMATS, "trajectory")
     boxes = choose_format(detections, formats.detections, DETECTION_FORMATS, "detections")
     return None if path.has_times(Path(odometry)) or boxes.name == "rosbag" else BY_NUMBER

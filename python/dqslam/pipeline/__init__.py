@@ -1,12 +1,7 @@
-"""Real recordings: what is assumed of them, their estimate, and what can be said about it."""
+"""From a recording, in memory or in files, to an estimate and a report: at once or step by step."""
 
-from dqslam.pipeline.border import cut_edges as cut_edges
-from dqslam.pipeline.border import with_cut_edges as with_cut_edges
-from dqslam.pipeline.conclude import Outcome as Outcome
 from dqslam.pipeline.conclude import RunResult as RunResult
-from dqslam.pipeline.conclude import conclude as conclude
-from dqslam.pipeline.hold_out import choose_held_out as choose_held_out
-from dqslam.pipeline.pipeline import perturb_odometry as perturb_odometry
-from dqslam.pipeline.pipeline import run as run
-from dqslam.pipeline.report import box_chi2 as box_chi2
-from dqslam.pipeline.report import trajectory_error as trajectory_error
+from dqslam.pipeline.files import run_files as run_files
+from dqslam.pipeline.options import RunFilesOptions as RunFilesOptions
+from dqslam.pipeline.options import RunOptions as RunOptions
+from dqslam.pipeline.recording import run as run

@@ -1,39 +1,65 @@
-"""What can be said about an estimate of a recording, once there is one."""
+"""The end of every run: what can be said about an estimate, once there is one."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dqslam import _core
-from dqslam.association import CHI2_GATE
-from dqslam.assumptions import BoxNoise, OdometryNoise, SizePrior, SizePriors
+from dqslam._checks import Bools, Floats, Ints
+from dqslam.association import CHI2_GATE, FINAL
+from dqslam.assumptions import OdometryNoise, SizePrior, SizePriors
 from dqslam.estimate import Estimate
+from dqslam.evaluation import trajectory_error
 from dqslam.io import Trajectory
 from dqslam.pipeline.hold_out import describe_overlap, overlap_with_map
+from dqslam.pipeline.options import RunOptions
 from dqslam.pipeline.report import (
     box_chi2,
     describe_boxes,
     describe_objects,
     describe_size_prior,
     describe_solver,
-    trajectory_error,
+    describe_times,
 )
 from dqslam.recording import Detections
 from dqslam.uncertainty import Marginals
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
+class EstimatorOutput:
+    """What an estimator answers: an estimate, how it was reached, and what was learned on the way.
+
+    Boxes are those that it was given.
+    """
+
+    estimate: Estimate
+    marginals: Marginals | None
+    """None without objects, as is the summary."""
+    summary: _core.Summary | None
+    object_id: Ints
+    """The object that each box shows, -1 for none, shape (m,)."""
+    keyframes: int
+    """Poses whose boxes took part."""
+    size_prior: SizePrior | SizePriors
+    odometry_noise: OdometryNoise | None
+    """Of a step, where it was estimated."""
+    live_poses: Floats | None = None
+    """Of a session, before its last polish: world_from_robot, shape (n, d)."""
+    step_ms: Floats | None = None
+    """Of a session: wall clock of each step, shape (n,)."""
+
+
+@dataclass(frozen=True, eq=False)
 class RunResult:
-    """An estimate, what it was made from, and its report, ready for JSON."""
+    """An estimate of a recording, what it was made from, and its report."""
 
     estimate: Estimate
     detections: Detections
     """All boxes, with the ids of the objects that they show; -1 for none."""
-    held_out: NDArray[np.bool_]
+    held_out: Bools
     """Which boxes were kept from the estimator, shape (m,)."""
     marginals: Marginals | None
     """Covariances of the poses, NaN between keyframes, and of the mapped objects; None without
@@ -41,84 +67,66 @@ class RunResult:
     summary: _core.Summary | None
     """How the solver got there; None without objects."""
     report: dict[str, Any]
-
-
-@dataclass(frozen=True, eq=False)
-class Outcome:
-    """An estimate, how it was reached, and what was assumed."""
-
-    estimate: Estimate
-    marginals: Marginals | None
-    summary: _core.Summary | None
-    mode: _core.Mode
-    keyframes: int
-    """Poses whose boxes took part."""
-    box_noise: BoxNoise
-    size_prior: SizePrior | SizePriors
-    odometry_noise: OdometryNoise | None
-    """Of a step, where it was estimated."""
+    """What report.json holds, in units that its keys name."""
 
 
 def conclude(
-    outcome: Outcome,
-    detections: Detections,
-    held_out: NDArray[np.bool_],
-    *,
-    ids_are_final: bool,
+    output: EstimatorOutput,
+    boxes: Detections,
+    held_out: Bools,
+    options: RunOptions,
     reference: Trajectory | None,
 ) -> RunResult:
-    """Judge an outcome by its boxes, those held out too, and by a reference trajectory.
+    """Judge an estimate by all boxes, (m,), those held out too, and by a reference trajectory.
 
-    ``detections`` are all boxes, with the objects that those not ``held_out`` (m,) show, -1 for
-    none. Boxes with final ids are tested against their object, others against any of their class.
+    Boxes with final ids are tested against their object, others against any of their class.
     """
-    estimate = outcome.estimate
-    object_id = detections.object_id.copy()
+    estimate, noise = output.estimate, output.odometry_noise
+    object_id = boxes.object_id.copy()
+    object_id[~held_out] = output.object_id
+    detections = replace(boxes, object_id=object_id)
     assigned = detections.select((object_id >= 0) & ~held_out)
-    chi2 = box_chi2(estimate, assigned, outcome.box_noise)
+    chi2 = box_chi2(estimate, assigned, options.box_noise)
     mapped = np.isin(assigned.object_id, estimate.object_ids)
     tests_held_out = bool(held_out.any())
     tested = detections.select(held_out if tests_held_out else ~held_out)
-    if not ids_are_final:
+    if options.trust_ids != FINAL:
         tested = replace(tested, object_id=np.full(len(tested), -1))
     overlap, tested_id = overlap_with_map(estimate, tested)
-    object_id[held_out] = tested_id if tests_held_out else -1
+    if tests_held_out:
+        object_id[held_out] = tested_id
     report = {
-        "mode": outcome.mode.name.lower(),
+        "mode": options.mode.name.lower(),
         "poses": len(estimate.timestamps),
-        "keyframes": outcome.keyframes,
+        "keyframes": output.keyframes,
         "boxes": describe_boxes(chi2[mapped])
         | {
             "of_dropped_objects": int(np.sum(~mapped)),
-            "unassigned": int(np.sum(detections.object_id[~held_out] < 0)),
+            "unassigned": int(np.sum(output.object_id < 0)),
         },
         "objects": describe_objects(estimate, assigned, chi2),
         "dropped_objects": {str(name): why for name, why in estimate.dropped.items()},
-        "size_prior": describe_size_prior(outcome.size_prior),
+        "size_prior": describe_size_prior(output.size_prior),
         "reprojection": describe_overlap(overlap) | {"held_out": tests_held_out},
-        "box_noise": {"pixels": outcome.box_noise.pixels, "relative": outcome.box_noise.relative},
-        "odometry_noise": _describe_noise(outcome.odometry_noise),
-        "under_constrained": [str(part) for part in outcome.marginals.under_constrained]
-        if outcome.marginals
+        "box_noise": asdict(options.box_noise),
+        "odometry_noise": {"from": "given"}
+        if noise is None
+        else {"from": "estimated"} | asdict(noise),
+        "under_constrained": [str(part) for part in output.marginals.under_constrained]
+        if output.marginals
         else [],
-        "trajectory_error": None if reference is None else trajectory_error(estimate, reference),
-        "solver": None if outcome.summary is None else describe_solver(outcome.summary),
+        "trajectory_error": None
+        if reference is None
+        else trajectory_error(estimate, reference, live_poses=output.live_poses),
+        "solver": None if output.summary is None else describe_solver(output.summary),
     }
+    if output.step_ms is not None:
+        report["online"] = describe_times(output.step_ms)
     return RunResult(
         estimate=replace(estimate, inliers=chi2 <= CHI2_GATE[4]),
         detections=replace(detections, object_id=object_id),
         held_out=held_out,
-        marginals=outcome.marginals,
-        summary=outcome.summary,
+        marginals=output.marginals,
+        summary=output.summary,
         report=report,
     )
-
-
-def _describe_noise(estimated: OdometryNoise | None) -> dict[str, Any]:
-    if estimated is None:
-        return {"from": "given"}
-    return {
-        "from": "estimated",
-        "translation_m": estimated.translation_m,
-        "rotation_rad": estimated.rotation_rad,
-    }

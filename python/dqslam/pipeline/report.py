@@ -1,4 +1,4 @@
-"""Judge an estimate by what can be known about it: its boxes, and a reference trajectory."""
+"""Judge an estimate by its boxes, and say what was assumed and how the solver got there."""
 
 from __future__ import annotations
 
@@ -11,9 +11,6 @@ from dqslam import _core
 from dqslam.association import gating
 from dqslam.assumptions import BoxNoise, SizePrior, SizePriors
 from dqslam.estimate import Estimate
-from dqslam.evaluation import common_poses
-from dqslam.io import Trajectory
-from dqslam.metrics import absolute_trajectory_error
 from dqslam.recording import Detections
 
 
@@ -38,37 +35,6 @@ def box_chi2(estimate: Estimate, detections: Detections, noise: BoxNoise) -> NDA
         noise.covariance(detections.box),
     )
     return np.where(mapped, chi2, np.inf)
-
-
-def trajectory_error(estimate: Estimate, reference: Trajectory) -> dict[str, Any]:
-    """Compare the poses before and after with a reference, at the times that both have.
-
-    ``ate_rmse_m`` is after rigid alignment; ``mean_m`` is the mean distance with the first common
-    pose made equal, the paper's RMSE_pos.
-    """
-    model, camera = estimate.pose_model, estimate.camera
-    common, row = common_poses(estimate.timestamps, reference)
-    true = reference.world_from_camera[row]
-
-    def error(poses: NDArray[np.float64]) -> dict[str, float]:
-        cameras = _core.world_from_camera(model, camera, poses)[common]
-        aligned = absolute_trajectory_error(cameras[:, :3], true[:, :3], align="se3")
-        moved = _start_at(true[0], cameras)
-        unaligned = absolute_trajectory_error(moved[:, :3], true[:, :3], align="none")
-        return {"ate_rmse_m": aligned.rmse, "mean_m": unaligned.mean}
-
-    return {
-        "poses": len(common),
-        "before": error(estimate.initial_poses),
-        "after": error(estimate.poses),
-    }
-
-
-def _start_at(first: NDArray[np.float64], poses: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Move a path (n, 7) as a whole so that it starts at a given pose (7,)."""
-    se3 = _core.PoseModel.SE3
-    first_from_path = _core.between(se3, np.repeat(poses[:1], len(poses), axis=0), poses)
-    return _core.compose(se3, np.repeat(first[None], len(poses), axis=0), first_from_path)
 
 
 def describe_boxes(chi2: NDArray[np.float64]) -> dict[str, Any]:
@@ -119,3 +85,13 @@ def describe_solver(summary: _core.Summary) -> dict[str, Any]:
         "message",
     )
     return {name: getattr(summary, name) for name in names}
+
+
+def describe_times(milliseconds: NDArray[np.float64]) -> dict[str, float]:
+    """Summarize the wall clock of all steps of a session, shape (n,)."""
+    return {
+        "step_ms_median": float(np.median(milliseconds)),
+        "step_ms_p99": float(np.percentile(milliseconds, 99)),
+        "step_ms_worst": float(milliseconds.max()),
+        "total_s": float(milliseconds.sum() / 1e3),
+    }

@@ -9,7 +9,7 @@ import numpy as np
 
 from dqslam._checks import Floats
 from dqslam._files import FileError, whole_file
-from dqslam.evaluation import BoxFits
+from dqslam.evaluation import fit_boxes
 from dqslam.io import Results
 from dqslam.plot.frame import draw_boxes, visible_outlines
 from dqslam.plot.style import class_styles, column_style, new_figure, save_figure
@@ -32,9 +32,10 @@ class Overlay:
     others are dashed, as something may hide them. Thin are the boxes, white those of no object.
     """
 
-    def __init__(self, results: Results, fits: BoxFits | None) -> None:
+    def __init__(self, results: Results) -> None:
         self._results = results
-        self._fits = fits
+        self.timestamps = results.timestamps
+        self._fits = None if results.boxes is None else fit_boxes(results)
         self._styles = class_styles(results.objects.class_name)
         camera = results.camera
         self._scale = max(camera.height / 480.0, 0.5)  # lines and names grow with the image
@@ -147,12 +148,12 @@ def save_video(
     images: Mapping[int, Path],
     path: Path,
     *,
-    rate: float,
+    rate: float | None = None,
     progress: Callable[[float], None] = lambda share: None,
 ) -> None:
     """Write images, by their poses, with their objects as a film, MP4 or GIF by its suffix.
 
-    ``rate`` is in frames a second. The file is whole or not there.
+    ``rate`` is in frames a second, by default that of the poses. The file is whole or not there.
 
     Raises
     ------
@@ -160,6 +161,8 @@ def save_video(
         For another suffix, for MP4 where there is no ffmpeg, or an image that cannot be read.
     """
     check_video(path)
+    if rate is None:
+        rate = usual_rate(overlay.timestamps[list(images)])
     with column_style(), whole_file(path) as temporary:
         writer = _writer(path.suffix.lower(), rate)
         with writer.saving(overlay.figure, str(temporary), dpi=_DPI):

@@ -1,14 +1,16 @@
 """How the robot of a scenario moves, and what its odometry says of it."""
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.random import Generator
+from numpy.random import Generator, default_rng
 
 from dqslam import _core
 from dqslam._checks import Bools, Floats
 from dqslam._core import PoseModel
-from dqslam.recording import Odometry
+from dqslam.assumptions import OdometryNoise
+from dqslam.recording import Odometry, Recording
 from dqslam.simulation.scenario import (
     OdometrySettings,
     OrbitSettings,
@@ -90,12 +92,30 @@ def measure_odometry(motion: TruePath, noise: OdometrySettings, random: Generato
     """Add noise to the true motion and say how large it is."""
     if isinstance(noise, PlanarOdometrySettings):
         return _measure_planar(motion, noise, random)
-    sigma = np.repeat([noise.translation_sigma_m, noise.rotation_sigma_rad], 3)
-    error = random.normal(0.0, sigma, size=(len(motion.relative), 6))
+    sigmas = (noise.translation_sigma_m, noise.rotation_sigma_rad)
+    return _measure_in_space(motion.poses[0], motion.relative, sigmas, random)
+
+
+def perturb_odometry(recording: Recording, noise: OdometryNoise, *, seed: int) -> Recording:
+    """Add Gaussian noise to every step in SE(3), and have the covariances say so.
+
+    For a recorded trajectory that is better than odometry would be.
+    """
+    odometry, sigmas = recording.odometry, (noise.translation_m, noise.rotation_rad)
+    noisy = _measure_in_space(odometry.first_pose, odometry.relative, sigmas, default_rng(seed))
+    return replace(recording, odometry=noisy)
+
+
+def _measure_in_space(
+    first_pose: Floats, relative: Floats, sigmas: tuple[float, float], random: Generator
+) -> Odometry:
+    """Add noise to steps (n, 7); the sigmas are of each axis, meters and radians."""
+    sigma = np.repeat(sigmas, 3)
+    error = random.normal(0.0, sigma, size=(len(relative), 6))
     return Odometry(
         PoseModel.SE3,
-        motion.poses[0],
-        _core.plus(PoseModel.SE3, motion.relative, error),
+        first_pose,
+        _core.plus(PoseModel.SE3, relative, error),
         np.tile(np.diag(sigma**2), (len(error), 1, 1)),
     )
 

@@ -70,7 +70,7 @@ VARIANTS = CLEAN_VARIANTS + ROBUST_VARIANTS
 
 
 @dataclass(frozen=True)
-class Outcome:
+class VariantSolve:
     """One solve of one trial; no error where it failed."""
 
     reached: bool
@@ -86,11 +86,11 @@ class Outcome:
 
 
 @dataclass(frozen=True, eq=False)
-class Trial:
+class AblationTrial:
     """One seed, with every variant."""
 
     seed: int
-    outcomes: dict[Variant, Outcome] = field(default_factory=dict)
+    solves: dict[Variant, VariantSolve] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,7 +200,7 @@ def run_ablation(
     for name, value, least in (("trials", trials, 1), ("seed", seed, 0), ("jobs", jobs, 1)):
         if value < least:
             raise ValueError(f"{name}: expected {least} or more, got {value}")
-    done: list[Trial] = []
+    done: list[AblationTrial] = []
     run = partial(run_trial, scenario, variants=VARIANTS if variants is None else variants)
     with closing(run_each(run, range(seed, seed + trials), jobs=min(jobs, trials))) as running:
         for trial in running:
@@ -210,45 +210,45 @@ def run_ablation(
     return tabulate(sorted(done, key=lambda trial: trial.seed))
 
 
-def tabulate(trials: list[Trial]) -> AblationTable:
+def tabulate(trials: list[AblationTrial]) -> AblationTable:
     """Summarize trials, given by ascending seed, by variant."""
-    variants = tuple(trials[0].outcomes)
+    variants = tuple(trials[0].solves)
     return AblationTable(
         trials=len(trials),
         seed=trials[0].seed,
         rows=tuple(
-            _row(variant, {trial.seed: trial.outcomes[variant] for trial in trials})
+            _row(variant, {trial.seed: trial.solves[variant] for trial in trials})
             for variant in variants
         ),
     )
 
 
-def _row(variant: Variant, outcomes: dict[int, Outcome]) -> Row:
-    solved = [one for one in outcomes.values() if not one.failure]
+def _row(variant: Variant, solves: dict[int, VariantSolve]) -> Row:
+    solved = [one for one in solves.values() if not one.failure]
     errors, bounds = (
         np.array([getattr(one, name) for one in solved]) for name in ("error_m", "bound_m")
     )
     return Row(
         variant=variant,
-        optimum_rate=float(np.mean([one.reached for one in outcomes.values()])),
+        optimum_rate=float(np.mean([one.reached for one in solves.values()])),
         error_over_bound=float(errors.sum() / bounds.sum()) if solved else np.nan,
         median_error_over_bound=float(np.median(errors / bounds)) if solved else np.nan,
-        iterations_med=float(np.median([one.iterations for one in outcomes.values()])),
-        seconds_med=float(np.median([one.seconds for one in outcomes.values()])),
-        failures={seed: one.failure for seed, one in outcomes.items() if one.failure},
+        iterations_med=float(np.median([one.iterations for one in solves.values()])),
+        seconds_med=float(np.median([one.seconds for one in solves.values()])),
+        failures={seed: one.failure for seed, one in solves.items() if one.failure},
     )
 
 
-def run_trial(scenario: Scenario, seed: int, *, variants: tuple[Variant, ...]) -> Trial:
+def run_trial(scenario: Scenario, seed: int, *, variants: tuple[Variant, ...]) -> AblationTrial:
     """Simulate one seed, clean and with wrong ids, and solve with every variant."""
     scenario = scenario.model_copy(update={"objects": "ellipsoids"})
     clean, truth = simulate(scenario, seed=seed)
-    trial = Trial(seed)
+    trial = AblationTrial(seed)
     for kind in dict.fromkeys(variant.wrong_ids for variant in variants):
         problem = _problem(scenario, seed, kind, clean, truth)
         for variant in variants:
             if variant.wrong_ids == kind:
-                trial.outcomes[variant] = _outcome(problem, variant)
+                trial.solves[variant] = _solve_variant(problem, variant)
     return trial
 
 
@@ -277,7 +277,7 @@ def _graph(recording: Recording) -> Graph:
     return build_graph(replace(recording, positions=None), box_noise=BoxNoise(1.0, 0.0))
 
 
-def _outcome(problem: _Problem, variant: Variant) -> Outcome:
+def _solve_variant(problem: _Problem, variant: Variant) -> VariantSolve:
     graph = problem.graph_of(variant)
     start = time.perf_counter()
     try:
@@ -285,9 +285,9 @@ def _outcome(problem: _Problem, variant: Variant) -> Outcome:
     except (RuntimeError, ValueError) as error:
         seconds = time.perf_counter() - start
         failure = f"{type(error).__name__}: {error}"
-        return Outcome(False, np.nan, problem.bound_m, 0, seconds, failure)
+        return VariantSolve(False, np.nan, problem.bound_m, 0, seconds, failure)
     seconds = time.perf_counter() - start
-    return Outcome(
+    return VariantSolve(
         reached=problem.is_optimum(variant, solution),
         error_m=position_error(problem.truth.pose_model, solution.poses, problem.truth.poses),
         bound_m=problem.bound_m,

@@ -75,7 +75,7 @@ def method_options(estimator: str, start: Start) -> SolveOptions:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class ObjectSolve:
     """One solve of one object."""
 
     converged: bool
@@ -85,25 +85,25 @@ class Outcome:
 
 
 @dataclass(frozen=True, eq=False)
-class Trial:
+class DegeneracyTrial:
     """One seed: an object for every motion."""
 
-    outcomes: dict[tuple[str, str, str], Outcome]
+    solves: dict[tuple[str, str, str], ObjectSolve]
     """By motion, estimator and start."""
     singular_values: dict[str, Floats]
     """Of the SVD start over the largest, descending, shape (10,), by motion."""
 
 
-def run_trial(seed: int) -> Trial:
+def run_trial(seed: int) -> DegeneracyTrial:
     """Look at an object along every motion, and solve with every estimator from every start."""
-    trial = Trial({}, {})
+    trial = DegeneracyTrial({}, {})
     streams = SeedSequence(seed).spawn(len(MOTIONS))
     for (name, motion), stream in zip(MOTIONS.items(), streams, strict=True):
         graph, ellipsoid = observe(motion, default_rng(stream))
         for estimator in ESTIMATORS:
             for label, start in STARTS.items():
                 options = method_options(estimator, start)
-                trial.outcomes[name, estimator, label] = _outcome(graph, options, ellipsoid)
+                trial.solves[name, estimator, label] = _solve_object(graph, options, ellipsoid)
         fit = _core.solve(graph.core, method_options("paper", Start.SVD))
         trial.singular_values[name] = fit.svd_singular_values[0] / fit.svd_singular_values[0, 0]
     return trial
@@ -157,13 +157,13 @@ def _exact_odometry(poses: Floats) -> Odometry:
     return Odometry(PoseModel.SE2, poses[0], relative, np.tile(np.eye(3), (len(relative), 1, 1)))
 
 
-def _outcome(graph: Graph, options: SolveOptions, ellipsoid: Floats) -> Outcome:
+def _solve_object(graph: Graph, options: SolveOptions, ellipsoid: Floats) -> ObjectSolve:
     is_free = options.landmark_model == LandmarkModel.DUAL_QUADRIC
     true_landmark = _core.dual_quadric_from_ellipsoid(ellipsoid) if is_free else ellipsoid
     best = _core.solve(graph.core, options, State(graph.core.initial_poses, [true_landmark]))
     found = _core.solve(graph.core, options)
     quadric = found.dual_quadrics[0]
-    return Outcome(
+    return ObjectSolve(
         converged=found.summary.final_cost < best.summary.final_cost + COST_TOLERANCE,
         center_error_m=float(np.linalg.norm(quadric[[3, 6, 8]] - ellipsoid[:3])),
         is_ellipsoid=_is_ellipsoid(quadric),
@@ -220,7 +220,7 @@ def run_degeneracy(*, trials: int, seed: int, progress: Progress | None = None) 
     for name, value, least in (("trials", trials, 1), ("seed", seed, 0)):
         if value < least:
             raise ValueError(f"{name}: expected {least} or more, got {value}")
-    done: list[Trial] = []
+    done: list[DegeneracyTrial] = []
     for one in range(seed, seed + trials):
         done.append(run_trial(one))
         if progress is not None:
@@ -228,28 +228,26 @@ def run_degeneracy(*, trials: int, seed: int, progress: Progress | None = None) 
     return tabulate(seed, done)
 
 
-def tabulate(seed: int, trials: list[Trial]) -> DegeneracyTable:
+def tabulate(seed: int, trials: list[DegeneracyTrial]) -> DegeneracyTable:
     """Summarize trials by motion, estimator and start."""
     return DegeneracyTable(
         trials=len(trials),
         seed=seed,
         motions=tuple(_motion_row(motion, trials) for motion in MOTIONS),
-        rows=tuple(
-            _row(key, [trial.outcomes[key] for trial in trials]) for key in trials[0].outcomes
-        ),
+        rows=tuple(_row(key, [trial.solves[key] for trial in trials]) for key in trials[0].solves),
     )
 
 
-def _motion_row(motion: str, trials: list[Trial]) -> MotionRow:
+def _motion_row(motion: str, trials: list[DegeneracyTrial]) -> MotionRow:
     values = np.median([trial.singular_values[motion] for trial in trials], axis=0)
     return MotionRow(motion, tuple(values.tolist()))
 
 
-def _row(key: tuple[str, str, str], outcomes: list[Outcome]) -> Row:
-    low, median, high = np.percentile([one.center_error_m for one in outcomes], [25, 50, 75])
+def _row(key: tuple[str, str, str], solves: list[ObjectSolve]) -> Row:
+    low, median, high = np.percentile([one.center_error_m for one in solves], [25, 50, 75])
     return Row(
         *key,
-        converged=float(np.mean([one.converged for one in outcomes])),
-        ellipsoids=float(np.mean([one.is_ellipsoid for one in outcomes])),
+        converged=float(np.mean([one.converged for one in solves])),
+        ellipsoids=float(np.mean([one.is_ellipsoid for one in solves])),
         center_error_m=(float(low), float(median), float(high)),
     )

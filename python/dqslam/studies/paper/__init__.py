@@ -20,7 +20,7 @@ from dqslam.studies.paper.table import PaperTable as PaperTable
 from dqslam.studies.paper.table import Statistics as Statistics
 from dqslam.studies.paper.table import TableRow as TableRow
 from dqslam.studies.paper.table import tabulate as tabulate
-from dqslam.studies.paper.trial import Outcome as Outcome
-from dqslam.studies.paper.trial import Trial as Trial
+from dqslam.studies.paper.trial import PaperTrial as PaperTrial
+from dqslam.studies.paper.trial import ScoredSolve as ScoredSolve
 from dqslam.studies.paper.trial import run_trial as run_trial
 from dqslam.studies.paper.trial import solve_and_score as solve_and_score

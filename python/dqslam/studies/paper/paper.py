@@ -20,7 +20,7 @@ from dqslam.studies.paper.methods import (
     seen_by,
 )
 from dqslam.studies.paper.table import PaperTable, tabulate
-from dqslam.studies.paper.trial import Trial, run_trial
+from dqslam.studies.paper.trial import PaperTrial, run_trial
 from dqslam.studies.pool import Backend, run_each
 
 Progress = Callable[[int, int], None]
@@ -59,7 +59,7 @@ def run_paper(
             raise ValueError(f"{name}: expected {least} or more, got {value}")
     settings = Settings(method, loss or default_loss(scenario, method), bound)
     run = partial(_run_seed, scenario=scenario, settings=settings)
-    done: list[Trial] = []
+    done: list[PaperTrial] = []
     seeds = range(seed, seed + trials)
     with closing(run_each(run, seeds, jobs=jobs, backend=backend, scheduler=scheduler)) as running:
         for trial in running:
@@ -69,7 +69,7 @@ def run_paper(
     return tabulate(sorted(done, key=lambda trial: trial.seed), scenario, settings)
 
 
-def _run_seed(seed: int, scenario: Scenario, settings: Settings) -> Trial:
+def _run_seed(seed: int, scenario: Scenario, settings: Settings) -> PaperTrial:
     return run_trial(scenario, seed, settings)
 
 

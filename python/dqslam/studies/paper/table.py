@@ -11,7 +11,7 @@ from dqslam.io.files import write_json
 from dqslam.simulation.scenario import Scenario
 from dqslam.studies.paper.methods import ROWS, Method, RowName, Settings, candidate_sigmas
 from dqslam.studies.paper.scores import summarize_bound
-from dqslam.studies.paper.trial import Outcome, Trial
+from dqslam.studies.paper.trial import PaperTrial, ScoredSolve
 
 METRICS = ("rmse_pos", "rmse_landmark", "rmse_volume")
 
@@ -138,8 +138,8 @@ def _scan_entry(row: TableRow) -> dict[str, Any]:
     }
 
 
-def tabulate(trials: Sequence[Trial], scenario: Scenario, settings: Settings) -> PaperTable:
-    """Put the outcomes of trials into a table."""
+def tabulate(trials: Sequence[PaperTrial], scenario: Scenario, settings: Settings) -> PaperTable:
+    """Put trials into a table."""
     sigmas = candidate_sigmas(settings.method)
     return PaperTable(
         seeds=tuple(trial.seed for trial in trials),
@@ -148,7 +148,7 @@ def tabulate(trials: Sequence[Trial], scenario: Scenario, settings: Settings) ->
         odometry=Statistics.of([trial.odometry_rmse_pos for trial in trials]),
         scan={
             row: tuple(
-                _table_row(sigma, {trial.seed: trial.outcomes[row][column] for trial in trials})
+                _table_row(sigma, {trial.seed: trial.solves[row][column] for trial in trials})
                 for column, sigma in enumerate(sigmas)
             )
             for row in ROWS
@@ -156,8 +156,8 @@ def tabulate(trials: Sequence[Trial], scenario: Scenario, settings: Settings) ->
     )
 
 
-def _table_row(sigma: float | None, outcomes: dict[int, Outcome]) -> TableRow:
-    reports = [outcome.report for outcome in outcomes.values() if outcome.report is not None]
+def _table_row(sigma: float | None, solves: dict[int, ScoredSolve]) -> TableRow:
+    reports = [one.report for one in solves.values() if one.report is not None]
     return TableRow(
         algebraic_sigma=sigma,
         metrics={
@@ -167,30 +167,25 @@ def _table_row(sigma: float | None, outcomes: dict[int, Outcome]) -> TableRow:
         volume_relative_error=Statistics.of(
             [error for report in reports for error in report.volume_relative_errors]
         ),
-        seconds_med=float(np.median([outcome.seconds for outcome in outcomes.values()])),
-        failures={
-            seed: outcome.failure for seed, outcome in outcomes.items() if outcome.report is None
-        },
+        seconds_med=float(np.median([one.seconds for one in solves.values()])),
+        failures={seed: one.failure for seed, one in solves.items() if one.report is None},
         worse_than_odometry=tuple(
             seed
-            for seed, outcome in outcomes.items()
-            if outcome.report is not None
-            and outcome.report.rmse_pos > outcome.report.odometry_rmse_pos
+            for seed, one in solves.items()
+            if one.report is not None and one.report.rmse_pos > one.report.odometry_rmse_pos
         ),
-        scores=_scores(list(outcomes.values())),
+        scores=_scores(list(solves.values())),
     )
 
 
-def _scores(outcomes: Sequence[Outcome]) -> dict[str, Any]:
+def _scores(solves: Sequence[ScoredSolve]) -> dict[str, Any]:
     """Average the scores of a row; those that no trial has are left out."""
-    bounds = [outcome.bound for outcome in outcomes if outcome.bound is not None]
+    bounds = [one.bound for one in solves if one.bound is not None]
     errors = [
-        outcome.report.rmse_pos
-        for outcome in outcomes
-        if outcome.bound is not None and outcome.report is not None
+        one.report.rmse_pos for one in solves if one.bound is not None and one.report is not None
     ]
     scores = summarize_bound(bounds, errors)
-    robust = [outcome.robust for outcome in outcomes if outcome.robust is not None]
+    robust = [one.robust for one in solves if one.robust is not None]
     if robust:
         scores["inlier_precision"] = float(np.mean([score.precision for score in robust]))
         scores["inlier_recall"] = float(np.mean([score.recall for score in robust]))

@@ -30,7 +30,7 @@ from dqslam.studies.paper.scores import (
 
 
 @dataclass(frozen=True)
-class Outcome:
+class ScoredSolve:
     """One solve of one trial: a report, or why there is none."""
 
     report: Report | None
@@ -46,25 +46,25 @@ class Outcome:
 
 
 @dataclass(frozen=True)
-class Trial:
-    """One seed: the error of odometry, and one outcome per row and candidate sigma."""
+class PaperTrial:
+    """One seed: the error of odometry, and one solve per row and candidate sigma."""
 
     seed: int
     odometry_rmse_pos: float
     """Meters."""
-    outcomes: dict[RowName, tuple[Outcome, ...]]
+    solves: dict[RowName, tuple[ScoredSolve, ...]]
 
 
-def run_trial(scenario: Scenario, seed: int, settings: Settings) -> Trial:
+def run_trial(scenario: Scenario, seed: int, settings: Settings) -> PaperTrial:
     """Simulate one seed and solve each row with each sigma; a solve may fail, and is kept."""
     recording, truth = simulate(scenario, seed=seed)
     odometry = recording.odometry
     poses = _core.dead_reckon(odometry.pose_model, odometry.first_pose, odometry.relative)
     believed = beliefs(scenario, settings)
-    return Trial(
+    return PaperTrial(
         seed=seed,
         odometry_rmse_pos=position_error(truth.pose_model, poses, truth.poses),
-        outcomes={
+        solves={
             row: tuple(
                 solve_and_score(
                     seen_by(row, recording),
@@ -89,7 +89,7 @@ def solve_and_score(
     *,
     told: SolveOptions,
     bound: bool,
-) -> Outcome:
+) -> ScoredSolve:
     """Solve what an estimator is given and compare it with the truth.
 
     Parameters
@@ -114,7 +114,7 @@ def solve_and_score(
         if not right.all():
             robust = score_robust(right_graph, right, truth, solved[0], told)
         summary = solved[1]
-        return Outcome(
+        return ScoredSolve(
             report,
             seconds,
             bound=score,
@@ -124,4 +124,4 @@ def solve_and_score(
         )
     except Exception as error:  # whatever it was: counted, shown and never dropped
         seconds = time.perf_counter() - start if seconds is None else seconds
-        return Outcome(None, seconds, f"{type(error).__name__}: {error}")
+        return ScoredSolve(None, seconds, f"{type(error).__name__}: {error}")

@@ -9,7 +9,7 @@ import numpy as np
 
 from dqslam._version import version
 from dqslam.simulation.simulator import simulate
-from dqslam.studies.paper import Outcome, seen_by, solve_and_score
+from dqslam.studies.paper import ScoredSolve, seen_by, solve_and_score
 from dqslam.studies.sweep.settings import TrialSettings
 
 # What a trial measures, and the unit; "" is a share, a count, or yes and no as 1 and 0.
@@ -83,7 +83,7 @@ def run_task(task: Task) -> TrialResult:
     metrics: dict[str, float | None] = {}
     try:
         recording, truth = simulate(task.settings.scenario, seed=task.seed)
-        outcome = solve_and_score(
+        solved = solve_and_score(
             seen_by(task.settings.input, recording),
             truth,
             task.settings.believed(),
@@ -91,17 +91,17 @@ def run_task(task: Task) -> TrialResult:
             told=task.settings.options(loss="none"),
             bound=task.settings.bound,
         )
-        failure = outcome.failure
+        failure = solved.failure
         if not failure:
-            metrics = _metrics(outcome)
+            metrics = _metrics(solved)
     except Exception as error:  # of simulation, say: a world without a single box
         failure = f"{type(error).__name__}: {error}"
     seconds = time.perf_counter() - start
     return TrialResult(task.key, task.seed, version(), seconds, metrics, failure)
 
 
-def _metrics(outcome: Outcome) -> dict[str, float | None]:
-    report, bound, robust = outcome.report, outcome.bound, outcome.robust
+def _metrics(solved: ScoredSolve) -> dict[str, float | None]:
+    report, bound, robust = solved.report, solved.bound, solved.robust
     assert report is not None  # there is one where there is no failure
     volumes = report.volume_relative_errors
     found: dict[str, float] = {
@@ -111,8 +111,8 @@ def _metrics(outcome: Outcome) -> dict[str, float | None]:
         "rmse_volume": report.rmse_volume,
         "volume_relative_error": float(np.median(volumes)) if volumes else np.nan,
         "mapped": report.mapped,
-        "iterations": outcome.iterations,
-        "converged": outcome.converged,
+        "iterations": solved.iterations,
+        "converged": solved.converged,
         "worse_than_odometry": report.rmse_pos > report.odometry_rmse_pos,
     }
     if bound is not None:

@@ -5,7 +5,7 @@ import signal
 
 import pytest
 
-from dqslam.cli.results import results_directory, uninterrupted
+from dqslam._files import results_directory, uninterrupted
 
 
 def test_a_directory_that_stays_empty_goes_again(tmp_path):

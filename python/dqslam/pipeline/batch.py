@@ -1,0 +1,108 @@
+"""A recording estimated at once: association, a polish, and the poses between the keyframes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dqslam import _core
+from dqslam.association import Association, associate, fill_in
+from dqslam.estimate import Estimate
+from dqslam.graph import solve
+from dqslam.pipeline.conclude import EstimatorOutput
+from dqslam.pipeline.options import Progress, RunOptions
+from dqslam.recording import Recording
+from dqslam.uncertainty import Marginals, UnderConstrained, marginal_covariances
+
+
+def estimate_batch(
+    recording: Recording, options: RunOptions, progress: Progress
+) -> EstimatorOutput:
+    """Find out which boxes show the same object, and estimate all of it together."""
+    found = associate(
+        recording,
+        trust=options.trust_ids,
+        mode=options.mode,
+        box_noise=options.box_noise,
+        size_prior=options.size_prior,
+        estimates_noise=options.estimates_noise,
+        progress=lambda share: progress(share, ""),
+    )
+    solver = options.solve_options()
+    solver.schedule = _core.Schedule.BATCH
+    estimate, marginals, summary = _finish(recording, found, solver)
+    tells_noise = options.estimates_noise and options.mode != _core.Mode.MAPPING
+    return EstimatorOutput(
+        estimate,
+        marginals,
+        summary,
+        object_id=found.object_id,
+        keyframes=len(found.keyframes),
+        size_prior=found.scene.size_prior,
+        odometry_noise=found.scene.odometry_noise if tells_noise else None,
+    )
+
+
+def _finish(
+    recording: Recording, found: Association, options: _core.SolveOptions
+) -> tuple[Estimate, Marginals | None, _core.Summary | None]:
+    """Polish what the association ends with, and fill in the poses between the keyframes."""
+    odometry = recording.odometry
+    path = _core.dead_reckon(odometry.pose_model, odometry.first_pose, odometry.relative)
+    graph = found.scene.graph()
+    if graph is None:
+        return _nothing(recording, path, found.left_out), None, None
+    solved, summary = solve(graph, options, start=found.scene.state(graph))
+    ids = found.ids[solved.object_ids]
+    order = np.argsort(ids)
+    order = order[ids[order] >= 0]  # those without a box, now that all images are seen, are gone
+    dropped = {int(found.ids[row]): why for row, why in solved.dropped.items()} | found.left_out
+    dropped.pop(-1, None)
+    nothing = _nothing(recording, path, dropped)
+    if not order.size:
+        return nothing, None, None
+    marginals = marginal_covariances(graph, solved, options)
+    boxes = dict(zip(*np.unique(found.object_id, return_counts=True), strict=True))
+    estimate = replace(
+        nothing,
+        poses=fill_in(recording, found.keyframes, solved.poses),
+        object_ids=ids[order],
+        class_names=tuple(solved.class_names[row] for row in order),
+        observations=np.array([boxes[name] for name in ids[order]], dtype=np.int64),
+        dual_quadrics=solved.dual_quadrics[order],
+        ellipsoids=solved.ellipsoids[order],
+    )
+    poses = np.full((len(path), *marginals.poses.shape[1:]), np.nan)
+    poses[found.keyframes] = marginals.poses
+    marginals = replace(
+        marginals,
+        poses=poses,
+        objects=marginals.objects[order],
+        under_constrained=tuple(_named(part, found) for part in marginals.under_constrained),
+    )
+    return estimate, marginals, summary
+
+
+def _named(part: UnderConstrained, found: Association) -> UnderConstrained:
+    """Name a pose by its row in the recording and an object by its id, not as in the solve."""
+    names = found.keyframes if part.kind == "pose" else found.ids
+    return replace(part, name=int(names[part.name]))
+
+
+def _nothing(recording: Recording, path: NDArray[np.float64], dropped: dict[int, str]) -> Estimate:
+    """Return the odometry as it is, and a map without objects."""
+    return Estimate(
+        pose_model=recording.odometry.pose_model,
+        camera=recording.camera,
+        timestamps=recording.timestamps,
+        poses=path,
+        initial_poses=path,
+        object_ids=np.zeros(0, dtype=np.int64),
+        class_names=(),
+        observations=np.zeros(0, dtype=np.int64),
+        dual_quadrics=np.zeros((0, 9)),
+        ellipsoids=np.zeros((0, 9)),
+        dropped=dict(sorted(dropped.items())),
+    )

@@ -1,0 +1,71 @@
+"""What may be chosen of a run: of a recording in memory, and of one in files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from dqslam import _core
+from dqslam.association import FINAL
+from dqslam.assumptions import BoxNoise, OdometryNoise, SizePrior, SizePriors
+from dqslam.io import FormatNames, FrameTimes
+from dqslam.io.recording import Ids
+
+Progress = Callable[[float, str], None]
+"""Is told the share of the work that is done, 0 to 1, and in a line where a session stands."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunOptions:
+    """What may be chosen of a run."""
+
+    trust_ids: float = FINAL
+    """Probability that an object id stays with its object, above 0.5 and at most 1: ids are final.
+    Without any ids it has no meaning."""
+    mode: _core.Mode = _core.Mode.SLAM
+    """SLAM improves the odometry, MAPPING takes it for the truth."""
+    box_noise: BoxNoise = BoxNoise()
+    """How far the edges of boxes are off."""
+    size_prior: SizePrior | SizePriors | None = None
+    """How large objects are; None learns one size for all from the objects that are found."""
+    estimates_noise: bool = False
+    """Whether the level of the odometry's noise is estimated instead of believed."""
+    hold_out: float = 0.0
+    """Share of the boxes, at least 0 and below 1, that the map is tested on instead."""
+    seed: int = 0
+    """Of the random choice of these boxes."""
+
+    def solve_options(self) -> _core.SolveOptions:
+        """Return the solver's options: its loss forgives boxes that show something else."""
+        return _core.SolveOptions(mode=self.mode, loss=_core.Loss.CAUCHY, loss_scale=2.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunFilesOptions(RunOptions):
+    """What may be chosen of a run, and of how its files are read.
+
+    Where nothing is said of the odometry's noise, its level is estimated.
+    """
+
+    ids: Ids = "track_id"
+    """Column that tells which boxes show the same object; "none" leaves that open."""
+    min_score: float = 0.5
+    """Boxes with a lower score are left out, 0 to 1."""
+    formats: FormatNames = FormatNames()
+    """Of the files, where their look does not tell."""
+    frames: FrameTimes | None = None
+    """Times of frames, for files that only count them; None has frame 0 at 0 s, 1 at 1 s."""
+    max_time_difference: float | None = None
+    """Seconds from a box to its pose; None is half the median interval between poses."""
+    added_noise: OdometryNoise | None = None
+    """Noise to add to every step of the odometry, with the same seed."""
+    odometry_noise: OdometryNoise | None = None
+    """What to believe of every step; None is the noise that was added, if any was."""
+    odometry_covariance: str | Path | None = None
+    """In its place, CSV of the covariance of each step, m and rad squared."""
+
+    @property
+    def believed_noise(self) -> OdometryNoise | None:
+        """What is believed of every step, if one noise is believed of all."""
+        return None if self.odometry_covariance else self.odometry_noise or self.added_noise

@@ -1,0 +1,81 @@
+"""A recording in memory, to a map, a trajectory and a report."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from dqslam import _core
+from dqslam.association import FINAL, UNSURE
+from dqslam.assumptions import SizePriors
+from dqslam.evaluation import common_poses
+from dqslam.io import Trajectory
+from dqslam.pipeline.batch import estimate_batch
+from dqslam.pipeline.border import with_cut_edges
+from dqslam.pipeline.conclude import RunResult, conclude
+from dqslam.pipeline.hold_out import choose_held_out
+from dqslam.pipeline.online import estimate_online
+from dqslam.pipeline.options import Progress, RunOptions
+from dqslam.recording import Recording
+
+
+def run(
+    recording: Recording,
+    options: RunOptions | None = None,
+    *,
+    online: bool = False,
+    reference: Trajectory | None = None,
+    progress: Progress = lambda share, text: None,
+) -> RunResult:
+    """Estimate the poses and the objects of a recording, and report.
+
+    Edges of boxes on the border of the image bound the object from one side only. Objects that do
+    not fit a world at rest are left out; without any object, the odometry is returned as it is.
+    Relative positions take no part.
+
+    Parameters
+    ----------
+    recording
+        Its object ids are those of a tracker, -1 where a box has none.
+    options
+        What is chosen, by default ``RunOptions()``.
+    online
+        Whether the recording is replayed through an ``OnlineSlam`` as it would arrive, with a
+        polish at the end; by default all of it is estimated at once.
+    reference
+        Trajectory to compare with, before and after: world_from_camera, in any world.
+    progress
+        Is told the share of the work that is done, 0 to 1, and, online, a line on each step.
+
+    Raises
+    ------
+    ValueError
+        For ``online`` in mode MAPPING, an option out of range, final ids that a box lacks, size
+        priors of a class that is not in the recording, or a reference of another time.
+
+    Examples
+    --------
+    >>> import dqslam as dq
+    >>> recording, truth = dq.simulate(dq.load_scenario("orbit"), seed=0)
+    >>> result = dq.run(recording, dq.RunOptions(hold_out=0.2))
+    >>> result.estimate.centers.shape  # meters
+    (8, 3)
+    >>> result.report["reprojection"]["iou_median"] > 0.8
+    True
+    """
+    options = options or RunOptions()
+    if online and options.mode == _core.Mode.MAPPING:
+        raise ValueError("online: a session improves the odometry, it has no mode MAPPING")
+    if reference is not None:  # before the work: may they be compared?
+        common_poses(recording.timestamps, reference)
+    recording = replace(with_cut_edges(recording), positions=None)
+    boxes = recording.detections
+    if isinstance(options.size_prior, SizePriors):
+        options.size_prior.check_classes(set(boxes.class_names.values()))
+    if options.trust_ids < FINAL or np.all(boxes.object_id < 0):
+        options = replace(options, trust_ids=min(options.trust_ids, UNSURE))
+    held_out = choose_held_out(len(boxes), options.hold_out, seed=options.seed)
+    known = replace(recording, detections=boxes.select(~held_out))
+    output = (estimate_online if online else estimate_batch)(known, options, progress)
+    return conclude(output, boxes, held_out, options, reference)
