@@ -10,6 +10,12 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 
+def assign(instance: object, **values: object) -> None:
+    """Set fields of a frozen dataclass while it is made."""
+    for name, value in values.items():
+        object.__setattr__(instance, name, value)
+
+
 def first_row(bad: Bools) -> int | None:
     """Return the first row with any bad entry, None when all are good; shape (n, ...)."""
     if not bad.any():
