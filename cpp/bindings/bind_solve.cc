@@ -4,6 +4,7 @@
 
 #include "bindings.h"
 #include "dqslam/estimation/solve.h"
+#include "keywords.h"
 
 namespace py = pybind11;
 using namespace pybind11::literals;
@@ -75,12 +76,8 @@ void BindEnums(py::module_& m) {
 
 void BindOptions(py::module_& m) {
   py::class_<SolveOptions>(m, "SolveOptions", "What a caller may choose.")
-      .def(py::init([](const py::kwargs& values) {
-             py::object options = py::cast(SolveOptions());
-             for (const auto& [name, value] : values) py::setattr(options, name, value);
-             return options.cast<SolveOptions>();
-           }),
-           "Any of the attributes as keywords.")
+      .def(py::init(&FromKeywords<SolveOptions>), "Any of the attributes as keywords.")
+      .def("__repr__", &ShowChanges<SolveOptions>)
       .def_readwrite("mode", &SolveOptions::mode)
       .def_readwrite("residual", &SolveOptions::residual)
       .def_readwrite("landmark_model", &SolveOptions::landmark_model)
@@ -150,7 +147,8 @@ void BindSolution(py::module_& m) {
                     &Summary::converged,
                     "The last stage met a stopping test and accepted a step.")
       .def_readonly("message", &Summary::message, "How it ended, in words.")
-      .def("__str__", &ToString);
+      .def("__str__", &ToString)
+      .def("__repr__", [](const Summary& s) { return "Summary(" + ToString(s) + ")"; });
   py::class_<Solution>(m, "Solution", "The answer of solve.")
       .def_readonly("poses", &Solution::poses, "Shape (n, d).")
       .def_readonly("landmarks", &Solution::landmarks, "Parameters of the model, shape (o, 9).")

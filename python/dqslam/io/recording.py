@@ -106,21 +106,14 @@ def load_recording(
     )
     if not rows.size:
         raise FileError(detections, _nothing_left(table, dropped, ids, tolerance, times))
-    model = _core.PoseModel.SE3
-    steps = len(path) - 1
-    covariance = (odometry_noise or OdometryNoise()).covariance(steps)
+    covariance = (odometry_noise or OdometryNoise()).covariance(len(path) - 1)
     if odometry_covariance is not None:
         covariance = read_step_covariances(odometry_covariance, times)
     classes = dict(zip(table.class_id.tolist(), table.class_name, strict=True))
     recording = Recording(
         camera=lens,
         timestamps=times,
-        odometry=Odometry(
-            pose_model=model,
-            first_pose=path[0],
-            relative=_core.between(model, path[:-1], path[1:]),
-            covariance=covariance,
-        ),
+        odometry=Odometry.from_poses(path, covariance=covariance),
         detections=Detections(
             pose=pose[rows],
             box=_undistorted(lens, camera, table, rows),

@@ -58,20 +58,20 @@ def load_map(directory: str | Path) -> KnownMap:
         raise FileError(Path(directory) / "map.json", "has no ellipsoid to find the way by")
     covariances = []
     for row in rows:
-        center = objects.center_covariance[row]
-        sigma = objects.log_semi_axes_sigma[row]
+        center = objects.center_covariances[row]
+        sigma = objects.log_semi_axes_sigmas[row]
         covariance = np.zeros((9, 9))
         known = np.isfinite(center).all()
         covariance[:3, :3] = center if known else _CENTER_SIGMA_M**2 * np.eye(3)
         log_sigma = sigma if np.isfinite(sigma).all() else np.full(3, _LOG_SIGMA)
         covariance[3:, 3:] = _shape_covariance(
-            objects.semi_axes[row], objects.orientation_xyzw[row], log_sigma
+            objects.semi_axes[row], objects.orientations[row], log_sigma
         )
         covariances.append(covariance)
     return KnownMap(
         camera=results.camera,
-        ids=objects.id[rows].tolist(),
-        class_names=tuple(objects.class_name[row] for row in rows),
+        ids=objects.object_ids[rows].tolist(),
+        class_names=tuple(objects.class_names[row] for row in rows),
         ellipsoids=objects.ellipsoids[rows],
         covariances=np.array(covariances),
     )

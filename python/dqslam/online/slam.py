@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dqslam import _core
-from dqslam._checks import Floats, Ints
+from dqslam._checks import Floats, Ints, require
+from dqslam._repr import counted
 from dqslam.association import FINAL, UNSURE
 from dqslam.assumptions import BoxNoise, OdometryNoise, SizePrior, SizePriors
 from dqslam.estimate import Estimate
@@ -29,6 +30,7 @@ from dqslam.online.step import (
     StepPositions,
     check_boxes,
 )
+from dqslam.recording import pose_model_of, pose_size
 
 _NO_FLOATS = np.zeros(0)
 
@@ -49,7 +51,8 @@ class OnlineSlam:
     online
         Of the steps: how many poses are minimized, and when.
     pose_model
-        SE2 or SE3.
+        SE2 or SE3; by default that of ``first_pose``, and without one that of the first motion:
+        until then the plane is assumed.
     first_pose, first_covariance
         world_from_robot of the first step, the origin by default, and its covariance (k, k), by
         default none: it is exact.
@@ -72,7 +75,7 @@ class OnlineSlam:
         options: _core.SolveOptions | None = None,
         *,
         online: _core.OnlineOptions | None = None,
-        pose_model: _core.PoseModel = _core.PoseModel.SE2,
+        pose_model: _core.PoseModel | None = None,
         first_pose: ArrayLike | None = None,
         first_covariance: ArrayLike | None = None,
         box_noise: BoxNoise | None = None,
@@ -83,6 +86,12 @@ class OnlineSlam:
         estimates_noise: bool = False,
     ) -> None:
         """Begin a session without a step."""
+        self._arguments = {name: value for name, value in locals().items() if name != "self"}
+        require(camera, _core.Camera, "OnlineSlam", "OnlineSlam(recording.camera)")
+        self._may_leave_plane = pose_model is None and first_pose is None
+        if pose_model is None:
+            given = np.zeros(3) if first_pose is None else first_pose
+            pose_model = pose_model_of("first_pose", given)
         self.camera = camera
         self.pose_model = pose_model
         self.solve_options = _core.SolveOptions() if options is None else options
@@ -148,6 +157,14 @@ class OnlineSlam:
             For a time that does not increase, a step without odometry, numbers that are not finite
             and boxes that are none. Nothing has changed then.
         """
+        for given, kind in ((odometry, Motion), (boxes, StepBoxes), (positions, StepPositions)):
+            if given is not None:
+                hint = "slam.add(step.odometry, step.boxes, timestamp=step.timestamp)"
+                require(given, kind, "OnlineSlam.add", hint)
+        if not self._timestamps:
+            self._first_step = (boxes, timestamp, positions)
+        elif self._may_leave_plane and odometry is not None:
+            self._settle_pose_model(odometry)
         self._polisher.take()
         count = len(self._timestamps)
         try:
@@ -195,6 +212,15 @@ class OnlineSlam:
             )
         return report
 
+    def _settle_pose_model(self, odometry: Motion) -> None:
+        """Begin again in space if that is where the first motion is."""
+        self._may_leave_plane = False
+        if np.shape(odometry.relative) == (pose_size(_core.PoseModel.SE3),):
+            space = OnlineSlam(**self._arguments | {"pose_model": _core.PoseModel.SE3})
+            boxes, timestamp, positions = self._first_step
+            space.add(None, boxes, timestamp=timestamp, positions=positions)
+            vars(self).update(vars(space))
+
     def _step_covariance(self) -> Floats | None:
         """Return the covariance that is estimated of a step, (k, k), if it is."""
         noise = self.odometry_noise
@@ -224,6 +250,11 @@ class OnlineSlam:
     def __len__(self) -> int:
         """Return the number of steps."""
         return len(self._timestamps)
+
+    def __repr__(self) -> str:
+        """Show the pose model, and how many steps and objects there are."""
+        steps, objects = counted(len(self), "step"), counted(self.count, "object")
+        return f"OnlineSlam({self.pose_model.name}, {steps}, {objects})"
 
     @property
     def pose(self) -> Floats:
@@ -380,7 +411,7 @@ class OnlineSlam:
         directory: str | Path,
         options: _core.SolveOptions | None = None,
         *,
-        pose_model: _core.PoseModel = _core.PoseModel.SE2,
+        pose_model: _core.PoseModel | None = None,
         robot_from_camera: ArrayLike | None = None,
         first_pose: ArrayLike | None = None,
         first_covariance: ArrayLike | None = None,
@@ -395,7 +426,8 @@ class OnlineSlam:
         """Continue a map that was saved: its objects, with their covariances, are what is known.
 
         Where the session begins is found from ``first_boxes``, or given; ``first_boxes`` are then
-        the first step. ``robot_from_camera`` is the mount, which no result has.
+        the first step. ``robot_from_camera`` is the mount, which no result has. The pose model is
+        that of ``first_pose``, or SE2 unless it is given.
 
         Raises
         ------
@@ -444,6 +476,7 @@ class OnlineSlam:
             self._map_covariance[len(self._registry.ids) - 1] = covariance
             self._journal.know_map_object(len(self._registry.ids) - 1, name, covariance)
         self._map_rows = len(self._registry.ids)
+        self._may_leave_plane = False
 
 
 def _with_loss(online: _core.OnlineOptions, loss_scale: float) -> _core.OnlineOptions:

@@ -128,7 +128,8 @@ def observe(motion: CameraMotion, random: Generator) -> tuple[Graph, Floats]:
         Recording(
             camera=camera,
             timestamps=np.arange(len(motion.poses), dtype=np.float64),
-            odometry=_exact_odometry(motion.poses),
+            # Exact; that the poses are known makes the covariance idle.
+            odometry=Odometry.from_poses(motion.poses, covariance=np.eye(3)),
             detections=Detections(
                 pose=pose,
                 box=box,
@@ -149,12 +150,6 @@ def _camera(heading: float) -> Camera:
     forward = [[0.0, 0.0, 0.0, -0.5, 0.5, -0.5, 0.5]]  # z forward, y down
     robot_from_camera = _core.compose(PoseModel.SE3, mount, forward)[0]
     return Camera(1500.0, 1500.0, 639.5, 511.5, 1280, 1024, robot_from_camera=robot_from_camera)
-
-
-def _exact_odometry(poses: Floats) -> Odometry:
-    """Return odometry without error; that poses are known makes its covariance idle."""
-    relative = _core.between(PoseModel.SE2, poses[:-1], poses[1:])
-    return Odometry(PoseModel.SE2, poses[0], relative, np.tile(np.eye(3), (len(relative), 1, 1)))
 
 
 def _outcome(graph: Graph, options: SolveOptions, ellipsoid: Floats) -> Outcome:

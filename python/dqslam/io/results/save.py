@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from dqslam import _core
-from dqslam._checks import Bools, Floats
+from dqslam._checks import Bools, Floats, require
 from dqslam.estimate import Estimate
 from dqslam.io.files import write_json
 from dqslam.io.results.boxes import write_boxes
@@ -54,6 +54,7 @@ def save_estimate(
         Covariances of the mapped objects, for the ellipsoid model, and of the poses, for
         ``covariance.csv``.
     """
+    require(estimate, Estimate, "save_estimate", "save_estimate(estimate, directory)")
     directory = Path(directory)
     paths = {"trajectory.txt": estimate.poses, "odometry.txt": estimate.initial_poses}
     for name, poses in paths.items():
