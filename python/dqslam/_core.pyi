@@ -80,6 +80,7 @@ class Camera:
         """
         Focal lengths, principal point and size in pixels; k1 k2 p1 p2 k3; the SE(3) mount.
         """
+    def __repr__(self) -> str: ...
     def distort_points(
         self, undistorted: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"]
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
@@ -149,6 +150,7 @@ class ScenePriors:
         """
         Any of the attributes as keywords.
         """
+    def __repr__(self) -> str: ...
     @property
     def camera_height(self) -> float:
         """
@@ -365,6 +367,7 @@ class SolveOptions:
         """
         Any of the attributes as keywords.
         """
+    def __repr__(self) -> str: ...
     @property
     def algebraic_sigma(self) -> float:
         """
@@ -477,6 +480,7 @@ class Summary:
     """
     How a solve went.
     """
+    def __repr__(self) -> str: ...
     def __str__(self) -> str: ...
     @property
     def converged(self) -> bool:
@@ -666,6 +670,7 @@ class OnlineOptions:
         """
         Any of the attributes as keywords.
         """
+    def __repr__(self) -> str: ...
     @property
     def lap_every(self) -> int:
         """
@@ -683,7 +688,7 @@ class OnlineOptions:
     @property
     def loop_absence(self) -> int:
         """
-        Poses without a sight before an object closes a loop.
+        Poses without a observation before an object closes a loop.
         """
     @loop_absence.setter
     def loop_absence(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
@@ -776,6 +781,7 @@ class StepReport:
     """
     What a step cost.
     """
+    def __repr__(self) -> str: ...
     @property
     def chi_square(self) -> float:
         """
@@ -791,7 +797,7 @@ class StepReport:
     @property
     def linearized(self) -> int:
         """
-        Sights, in the window and to keep what lies before it.
+        Observations, in the window and to keep what lies before it.
         """
     @property
     def pose(self) -> int:
@@ -804,19 +810,19 @@ class StepReport:
         Young objects were started again.
         """
     @property
+    def smoothed_observations(self) -> int:
+        """
+        Observations linearized there.
+        """
+    @property
     def smoothed_poses(self) -> int:
         """
         Poses minimized beside the window; 0 at most steps.
         """
     @property
-    def smoothed_observations(self) -> int:
-        """
-        Sights linearized there.
-        """
-    @property
     def undefined(self) -> int:
         """
-        Sights of the window whose objects are not in front.
+        Observations of the window whose objects are not in front.
         """
     @property
     def window_objects(self) -> int:
@@ -893,14 +899,14 @@ class Session:
         """
     def relabel(
         self,
-        sight: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
+        observation: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
         object: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
         ellipsoid: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"] = ...,
         log_size_mean: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] = ...,
         log_size_sigma: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] = ...,
     ) -> None:
         """
-        Give boxes (n,), by the rows of their sights, to other objects (n,): -1 waits, num_objects + i is a new object that starts from ellipsoid (m, 9), log-Cholesky, in the world.
+        Give boxes (n,), by the rows of their observations, to other objects (n,): -1 waits, num_objects + i is a new object that starts from ellipsoid (m, 9), log-Cholesky, in the world.
         """
     def scale_odometry(
         self,

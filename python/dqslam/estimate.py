@@ -19,7 +19,18 @@ def quadric_shapes(dual_quadrics: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """Poses and objects as estimated, and the poses it started from."""
+    """Poses and objects as estimated, and the poses it started from.
+
+    Examples
+    --------
+    >>> import dqslam as dq
+    >>> recording, truth = dq.simulate(dq.load_scenario("paper"), seed=7)
+    >>> estimate, summary = dq.solve(dq.build_graph(recording))
+    >>> estimate.poses.shape, estimate.centers.shape, estimate.semi_axes.shape
+    ((253, 3), (10, 3), (10, 3))
+    >>> dict(zip(estimate.object_ids.tolist(), estimate.class_names))[4]
+    'cube'
+    """
 
     pose_model: PoseModel
     camera: Camera

@@ -63,6 +63,14 @@ def build_graph(
     ValueError
         When there are no boxes, one has no object id, a relative position belongs to an object
         without boxes, a size prior to a class without boxes, or the core refuses the problem.
+
+    Examples
+    --------
+    >>> import dqslam as dq
+    >>> recording, truth = dq.simulate(dq.load_scenario("paper"), seed=7)
+    >>> graph = dq.build_graph(recording, box_noise=dq.BoxNoise(pixels=1.0))
+    >>> graph
+    Graph(SE2, 253 poses, 456 boxes of 10 objects)
     """
     require(recording, Recording, "build_graph", "recording, truth = simulate(scenario, seed=0)")
     box_noise = BoxNoise() if box_noise is None else box_noise
@@ -110,6 +118,17 @@ def solve(
 
     Objects that the landmark model left as no ellipsoid have NaN in `Estimate.ellipsoids`. With a
     robust loss, objects that too few boxes fit are not in the estimate but in `Estimate.dropped`.
+
+    Examples
+    --------
+    >>> import dqslam as dq
+    >>> recording, truth = dq.simulate(dq.load_scenario("paper"), seed=7)
+    >>> graph = dq.build_graph(recording)
+    >>> estimate, summary = dq.solve(graph, dq.SolveOptions(loss=dq.Loss.CAUCHY))
+    >>> estimate
+    Estimate(SE2, 253 poses, 10 objects)
+    >>> summary.converged
+    True
     """
     require(graph, Graph, "solve", "call build_graph(recording) first")
     options = _core.SolveOptions() if options is None else options

@@ -118,6 +118,19 @@ def associate(
     ------
     ValueError
         For a trust out of range, or at 1 for boxes without an id.
+
+    Examples
+    --------
+    A camera that is carried half around a table, and boxes whose ids are not trusted:
+
+    >>> import dqslam as dq
+    >>> scenario = dq.load_scenario("orbit")
+    >>> path = scenario.path.model_copy(update={"turns": 0.5, "poses": 30})
+    >>> recording, truth = dq.simulate(scenario.model_copy(update={"path": path}), seed=1)
+    >>> found = dq.associate(recording, trust=0.9)
+    >>> graph = found.build_graph()
+    >>> dq.solve(graph, start=found.start(graph))[0]
+    Estimate(SE3, 30 poses, 8 objects)
     """
     require(recording, Recording, "associate", "recording, dropped = load_recording(...)")
     if not 0.5 < trust <= FINAL:

@@ -82,6 +82,21 @@ def load_recording(
         Names of the formats, where files do not look like what they are.
     frames
         Times of the frames, for files that only count them: see ``choose_frame_times``.
+
+    Examples
+    --------
+    Files as a robot may have them, here those of a simulated drive:
+
+    >>> import dqslam as dq
+    >>> simulated, truth = dq.simulate(dq.load_scenario("paper"), seed=7)
+    >>> dq.io.save_recording(simulated, "drive")
+    >>> recording, dropped = dq.load_recording(
+    ...     "drive/camera.json", "drive/odometry.txt", "drive/boxes.csv"
+    ... )
+    >>> recording
+    Recording(SE3, 253 poses, 456 boxes of 10 objects, 1 class)
+    >>> dropped.few_boxes
+    {}
     """
     if not 0 <= min_score <= 1:
         raise ValueError(f"min_score is {min_score:g}, not between 0 and 1")

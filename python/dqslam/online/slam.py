@@ -67,6 +67,18 @@ class OnlineSlam:
     estimates_noise
         Whether the level of the odometry's noise is estimated from such boxes, and the covariances
         of the steps are not believed.
+
+    Examples
+    --------
+    >>> import dqslam as dq
+    >>> recording, truth = dq.simulate(dq.load_scenario("paper"), seed=7)
+    >>> slam = dq.OnlineSlam(recording.camera)
+    >>> for step in dq.steps_of(recording):
+    ...     report = slam.add(step.odometry, step.boxes, timestamp=step.timestamp)
+    >>> slam
+    OnlineSlam(SE2, 253 steps, 10 objects)
+    >>> slam.polish().result().summary.converged
+    True
     """
 
     def __init__(

@@ -101,6 +101,18 @@ def load_results(directory: str | Path) -> Results:
     """Read a directory of results; FileError names what is missing or wrong, and its line.
 
     ``covariance.csv``, ``boxes.csv`` and ``report.json`` may be absent.
+
+    Examples
+    --------
+    Names are those of an estimate, those of objects under ``objects``; poses are the camera's:
+
+    >>> import dqslam as dq
+    >>> recording, truth = dq.simulate(dq.load_scenario("paper"), seed=7)
+    >>> estimate, summary = dq.solve(dq.build_graph(recording))
+    >>> dq.save_estimate(estimate, "results/seed7")
+    >>> results = dq.load_results("results/seed7")
+    >>> results.poses.shape, results.objects.centers.shape
+    ((253, 7), (10, 3))
     """
     directory = Path(directory)
     if not directory.is_dir():

@@ -53,6 +53,17 @@ def save_estimate(
     marginals
         Covariances of the mapped objects, for the ellipsoid model, and of the poses, for
         ``covariance.csv``.
+
+    Examples
+    --------
+    >>> import dqslam as dq
+    >>> recording, truth = dq.simulate(dq.load_scenario("paper"), seed=7)
+    >>> graph = dq.build_graph(recording)
+    >>> estimate, summary = dq.solve(graph)
+    >>> marginals = dq.marginal_covariances(graph, estimate)
+    >>> dq.save_estimate(estimate, "results/seed7", marginals=marginals)
+    >>> dq.load_results("results/seed7")
+    Results('results/seed7', 253 poses, 10 objects)
     """
     require(estimate, Estimate, "save_estimate", "save_estimate(estimate, directory)")
     directory = Path(directory)
