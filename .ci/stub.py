@@ -15,7 +15,6 @@ def generate(directory: Path) -> Path:
     """Run the generator on the installed extension, any unknown C++ type being an error."""
     options = ["--exit-code", "--output-dir", directory]
     options += ["--enum-class-locations", ".+:dqslam._core"]
-    options += ["--ignore-invalid-expressions", "<dqslam._core.* object at .*>"]  # defaults: ...
     generator = [sys.executable, "-m", "pybind11_stubgen", "dqslam._core"]
     subprocess.run([*generator, *options], check=True)
     return directory / "dqslam" / "_core.pyi"

@@ -47,6 +47,17 @@ void BindCamera(py::module_& m) {
       .def_readonly("distortion", &Camera::distortion, "k1 k2 p1 p2 k3, shape (5,).")
       .def_readonly("robot_from_camera", &Camera::robot_from_camera, "SE(3) pose, shape (7,).")
       .def_property_readonly("has_distortion", &Camera::HasDistortion)
+      .def("__repr__",
+           [](const Camera& c) {
+             return py::str("Camera({} x {} px, fx={:g}, fy={:g}, cx={:g}, cy={:g}{})")
+                 .format(c.width,
+                         c.height,
+                         c.fx,
+                         c.fy,
+                         c.cx,
+                         c.cy,
+                         c.HasDistortion() ? ", distorted" : "");
+           })
       .def("undistort_points",
            &Camera::UndistortPoints,
            "distorted"_a,

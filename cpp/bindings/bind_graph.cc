@@ -3,6 +3,7 @@
 
 #include "bindings.h"
 #include "dqslam/problem/graph.h"
+#include "keywords.h"
 
 namespace py = pybind11;
 using namespace pybind11::literals;
@@ -59,12 +60,8 @@ void BindTables(py::module_& m) {
 void BindScenePriors(py::module_& m) {
   py::class_<ScenePriors>(
       m, "ScenePriors", "What is known of the scene; each part is off while its sigma is 0.")
-      .def(py::init([](const py::kwargs& values) {
-             py::object priors = py::cast(ScenePriors());
-             for (const auto& [name, value] : values) py::setattr(priors, name, value);
-             return priors.cast<ScenePriors>();
-           }),
-           "Any of the attributes as keywords.")
+      .def(py::init(&FromKeywords<ScenePriors>), "Any of the attributes as keywords.")
+      .def("__repr__", &ShowChanges<ScenePriors>)
       .def_readwrite("up", &ScenePriors::up, "Unit normal n of the ground, in the world, (3,).")
       .def_readwrite(
           "plane_offset", &ScenePriors::plane_offset, "d of the ground n.x + d = 0, meters.")

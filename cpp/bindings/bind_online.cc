@@ -4,6 +4,7 @@
 #include "bindings.h"
 #include "dqslam/online/relocalize.h"
 #include "dqslam/online/session.h"
+#include "keywords.h"
 
 namespace py = pybind11;
 using namespace pybind11::literals;
@@ -19,12 +20,8 @@ using online::StepReport;
 
 void BindOptions(py::module_& m) {
   py::class_<OnlineOptions>(m, "OnlineOptions", "What a caller of a session may choose.")
-      .def(py::init([](const py::kwargs& values) {
-             py::object options = py::cast(OnlineOptions());
-             for (const auto& [name, value] : values) py::setattr(options, name, value);
-             return options.cast<OnlineOptions>();
-           }),
-           "Any of the attributes as keywords.")
+      .def(py::init(&FromKeywords<OnlineOptions>), "Any of the attributes as keywords.")
+      .def("__repr__", &ShowChanges<OnlineOptions>)
       .def_readwrite("window_poses", &OnlineOptions::window_poses, "Minimized at every step.")
       .def_readwrite("window_iterations",
                      &OnlineOptions::window_iterations,
@@ -60,6 +57,7 @@ void BindOptions(py::module_& m) {
 
 void BindReport(py::module_& m) {
   py::class_<StepReport>(m, "StepReport", "What a step cost.")
+      .def("__repr__", &ShowChanges<StepReport>)
       .def_readonly("pose", &StepReport::pose, "Row of the new pose.")
       .def_readonly("first_observation",
                     &StepReport::first_observation,

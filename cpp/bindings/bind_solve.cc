@@ -4,6 +4,7 @@
 
 #include "bindings.h"
 #include "dqslam/estimation/solve.h"
+#include "keywords.h"
 
 namespace py = pybind11;
 using namespace pybind11::literals;
@@ -75,12 +76,9 @@ void BindEnums(py::module_& m) {
 
 void BindOptions(py::module_& m) {
   py::class_<SolveOptions>(m, "SolveOptions", "Options of solve.")
-      .def(py::init([](const py::kwargs& values) {
-             py::object options = py::cast(SolveOptions());
-             for (const auto& [name, value] : values) py::setattr(options, name, value);
-             return options.cast<SolveOptions>();
-           }),
+      .def(py::init(&FromKeywords<SolveOptions>),
            "Set any of the attributes by keywords; the others have their defaults.")
+      .def("__repr__", &ShowChanges<SolveOptions>)
       .def_readwrite("mode",
                      &SolveOptions::mode,
                      "SLAM estimates poses and objects; MAPPING keeps the poses fixed.")
@@ -175,7 +173,8 @@ void BindSolution(py::module_& m) {
                     &Summary::converged,
                     "Whether the last stage met a stopping test and accepted a step.")
       .def_readonly("message", &Summary::message, "The reason why the last stage ended.")
-      .def("__str__", &ToString);
+      .def("__str__", &ToString)
+      .def("__repr__", [](const Summary& s) { return "Summary(" + ToString(s) + ")"; });
   py::class_<Solution>(m, "Solution", "The result of solve.")
       .def_readonly("poses", &Solution::poses, "Poses, shape (n, d).")
       .def_readonly(

@@ -22,7 +22,6 @@ _SHORTER = [
     (r"collections\.abc\.Sequence", "Sequence"),
     (r"array\(\[\](, \w+=[^)]*(\(0, \d\)[^)]*)?)?\)", "[]"),
     (r"array\(\[([^\]]*)\]\)", r"[\1]"),
-    (r"<dqslam\._core\.(\w+) object at \w+>", r"\1()"),
     (
         r"~?(numpy\.)?ndarray\[tuple\[~?(typing\.)?Any, \.\.\.\], "
         r"~?(numpy\.)?dtype\[~?(numpy\.)?(\w+)\]\]",

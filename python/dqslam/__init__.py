@@ -3,16 +3,36 @@
 Each name is imported when it is first asked for: a command's help waits for none of them.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+TYPE_CHECKING = False  # type checkers know better; typing's own takes longer to import than this
 
-if TYPE_CHECKING:  # what type checkers see; a test holds it and the table below together
+if TYPE_CHECKING:  # the one list of public names, a line each: lazy_exports reads it, too
+    from dqslam import association as association
+    from dqslam import assumptions as assumptions
+    from dqslam import evaluation as evaluation
+    from dqslam import inspection as inspection
+    from dqslam import io as io
+    from dqslam import metrics as metrics
+    from dqslam import online as online
+    from dqslam import pipeline as pipeline
+    from dqslam import plot as plot
+    from dqslam import simulation as simulation
+    from dqslam import studies as studies
+    from dqslam import view as view
+    from dqslam._core import Backend as Backend
     from dqslam._core import Camera as Camera
+    from dqslam._core import LandmarkModel as LandmarkModel
     from dqslam._core import Loss as Loss
+    from dqslam._core import Minimizer as Minimizer
+    from dqslam._core import Mode as Mode
     from dqslam._core import OnlineOptions as OnlineOptions
     from dqslam._core import PoseModel as PoseModel
+    from dqslam._core import Residual as Residual
     from dqslam._core import ScenePriors as ScenePriors
+    from dqslam._core import Schedule as Schedule
     from dqslam._core import SolveOptions as SolveOptions
+    from dqslam._core import Start as Start
+    from dqslam._core import State as State
+    from dqslam._core import StepReport as StepReport
     from dqslam._core import Summary as Summary
     from dqslam.association import Association as Association
     from dqslam.association import associate as associate
@@ -61,73 +81,7 @@ if TYPE_CHECKING:  # what type checkers see; a test holds it and the table below
     from dqslam.uncertainty import Marginals as Marginals
     from dqslam.uncertainty import marginal_covariances as marginal_covariances
     from dqslam.uncertainty import posterior_bound as posterior_bound
+else:
+    from dqslam._lazy import lazy_exports
 
-_NAMES = {
-    "dqslam._core": (
-        "Camera",
-        "Loss",
-        "OnlineOptions",
-        "PoseModel",
-        "ScenePriors",
-        "SolveOptions",
-        "Summary",
-    ),
-    "dqslam.association": ("Association", "associate"),
-    "dqslam.estimate": ("Estimate",),
-    "dqslam.metrics": (
-        "Report",
-        "absolute_trajectory_error",
-        "align_rigid",
-        "evaluate",
-        "relative_pose_error",
-    ),
-    "dqslam.evaluation": ("evaluate_results",),
-    "dqslam.studies.paper": ("run_paper",),
-    "dqslam.io": ("load_recording", "load_results", "save_estimate"),
-    "dqslam.online": (
-        "Motion",
-        "OnlineSlam",
-        "Step",
-        "StepBoxes",
-        "StepError",
-        "StepPositions",
-        "steps_of",
-    ),
-    "dqslam.pipeline": ("RunFilesOptions", "RunOptions", "RunResult", "run", "run_files"),
-    "dqslam.plot": ("plot_maps",),
-    "dqslam.graph": ("Graph", "build_graph", "solve"),
-    "dqslam.recording": (
-        "Detections",
-        "Measurements",
-        "Odometry",
-        "Recording",
-        "RelativePositions",
-        "Truth",
-    ),
-    "dqslam.simulation": ("Scenario", "load_scenario", "simulate"),
-    "dqslam.assumptions": (
-        "BoxNoise",
-        "OdometryNoise",
-        "SizePrior",
-        "SizePriors",
-        "load_size_priors",
-    ),
-    "dqslam.uncertainty": ("Bound", "Marginals", "marginal_covariances", "posterior_bound"),
-}
-_HOMES = {name: module for module, names in _NAMES.items() for name in names}
-__all__ = sorted(_HOMES)
-
-
-if not TYPE_CHECKING:  # or every name would be known
-
-    def __getattr__(name: str) -> Any:
-        """Import a public name when it is first asked for (PEP 562)."""
-        if name not in _HOMES:
-            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        value = getattr(import_module(_HOMES[name]), name)
-        globals()[name] = value
-        return value
-
-
-def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

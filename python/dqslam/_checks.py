@@ -1,4 +1,4 @@
-"""Checks of arrays that name the array and the row in what they raise."""
+"""Checks of arguments, and of arrays by row: what they raise says which one is wrong."""
 
 from collections.abc import Sequence
 
@@ -8,6 +8,23 @@ from numpy.typing import ArrayLike, NDArray
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
+
+
+def require(value: object, kind: type, call: str, hint: str) -> None:
+    """Raise a TypeError that says what a call needs, and how one gets it."""
+    if not isinstance(value, kind):
+        given, wanted = _with_article(type(value).__name__), _with_article(kind.__name__)
+        raise TypeError(f"{call} needs {wanted}, not {given}: {hint}")
+
+
+def _with_article(name: str) -> str:
+    return f"{'an' if name[0] in 'AEIOUaeiou' else 'a'} {name}"
+
+
+def assign(instance: object, **values: object) -> None:
+    """Set fields of a frozen dataclass while it is made."""
+    for name, value in values.items():
+        object.__setattr__(instance, name, value)
 
 
 def first_row(bad: Bools) -> int | None:

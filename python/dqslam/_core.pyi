@@ -85,6 +85,7 @@ class Camera:
         """
         Focal lengths, principal point and size in pixels; k1 k2 p1 p2 k3; the SE(3) mount.
         """
+    def __repr__(self) -> str: ...
     def distort_points(
         self, undistorted: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"]
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
@@ -289,6 +290,7 @@ class ScenePriors:
         """
         Any of the attributes as keywords.
         """
+    def __repr__(self) -> str: ...
     @property
     def camera_height(self) -> float:
         """
@@ -469,6 +471,7 @@ class SolveOptions:
         """
         Any of the attributes as keywords.
         """
+    def __repr__(self) -> str: ...
     @property
     def algebraic_sigma(self) -> float:
         """
@@ -581,6 +584,7 @@ class Summary:
     """
     How a solve went.
     """
+    def __repr__(self) -> str: ...
     def __str__(self) -> str: ...
     @property
     def converged(self) -> bool:
@@ -791,6 +795,7 @@ class OnlineOptions:
         """
         Any of the attributes as keywords.
         """
+    def __repr__(self) -> str: ...
     @property
     def lap_every(self) -> int:
         """
@@ -901,6 +906,7 @@ class StepReport:
     """
     What a step cost.
     """
+    def __repr__(self) -> str: ...
     @property
     def chi_square(self) -> float:
         """

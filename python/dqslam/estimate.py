@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from dqslam._checks import Bools, Floats, Ints
-from dqslam._core import Camera, PoseModel
+from dqslam._core import Camera, PoseModel, axes_from_ellipsoid
+from dqslam._repr import counted
 
 
 def quadric_shapes(dual_quadrics: Floats) -> Floats:
@@ -18,7 +19,18 @@ def quadric_shapes(dual_quadrics: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """Poses and objects as estimated, and the poses it started from."""
+    """Poses and objects as estimated, and the poses it started from.
+
+    Examples
+    --------
+    >>> import dqslam as dq
+    >>> recording, truth = dq.simulate(dq.load_scenario("paper"), seed=7)
+    >>> estimate, summary = dq.solve(dq.build_graph(recording))
+    >>> estimate.poses.shape, estimate.centers.shape, estimate.semi_axes.shape
+    ((253, 3), (10, 3), (10, 3))
+    >>> dict(zip(estimate.object_ids.tolist(), estimate.class_names))[4]
+    'cube'
+    """
 
     pose_model: PoseModel
     camera: Camera
@@ -43,6 +55,14 @@ class Estimate:
     dropped: Mapping[int, str] = field(default_factory=dict)
     """Ids of the objects that were not mapped, and why."""
 
+    def __repr__(self) -> str:
+        """Show the pose model, and how many poses and objects there are."""
+        parts = [self.pose_model.name, counted(len(self.poses), "pose")]
+        parts.append(counted(len(self.object_ids), "object"))
+        if self.dropped:
+            parts.append(f"{len(self.dropped)} dropped")
+        return f"Estimate({', '.join(parts)})"
+
     @property
     def centers(self) -> Floats:
         """Centers of the objects in the world, meters, shape (o, 3): (q4, q7, q9)."""
@@ -52,6 +72,23 @@ class Estimate:
     def shapes(self) -> Floats:
         """Shapes S of the objects, square meters, (o, 3, 3); of any signature."""
         return quadric_shapes(self.dual_quadrics)
+
+    @property
+    def semi_axes(self) -> Floats:
+        """Semi-axes of the objects, meters, descending, shape (o, 3); NaN for no ellipsoid."""
+        return self._axes()[:, :3]
+
+    @property
+    def orientations(self) -> Floats:
+        """world_from_object of each object, x y z w, shape (o, 4); NaN for no ellipsoid."""
+        return self._axes()[:, 3:]
+
+    def _axes(self) -> Floats:
+        """Return semi-axes and orientation of each object, shape (o, 7)."""
+        rows = np.full((len(self.object_ids), 7), np.nan)
+        for row in np.flatnonzero(self.is_ellipsoid):
+            rows[row] = np.concatenate(axes_from_ellipsoid(self.ellipsoids[row])[1:])
+        return rows
 
     @property
     def is_ellipsoid(self) -> Bools:

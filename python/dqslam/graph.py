@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from dqslam import _core
-from dqslam._checks import Bools, Floats, Ints, as_floats, reject_rows
+from dqslam._checks import Bools, Floats, Ints, as_floats, reject_rows, require
+from dqslam._repr import counted
 from dqslam.assumptions import BoxNoise, SizePrior, SizePriors
 from dqslam.estimate import Estimate
 from dqslam.recording import Detections, Measurements, Recording
@@ -32,6 +33,13 @@ class Graph:
     observations: Ints
     """Boxes per object, shape (o,)."""
 
+    def __repr__(self) -> str:
+        """Show the pose model, and how many poses, boxes and objects there are."""
+        poses = counted(len(self.timestamps), "pose")
+        boxes = counted(len(self.core.boxes), "box")
+        objects = counted(len(self.object_ids), "object")
+        return f"Graph({self.core.pose_model.name}, {poses}, {boxes} of {objects})"
+
 
 def build_graph(
     recording: Recording,
@@ -55,7 +63,16 @@ def build_graph(
     ValueError
         When there are no boxes, one has no object id, a relative position belongs to an object
         without boxes, a size prior to a class without boxes, or the core refuses the problem.
+
+    Examples
+    --------
+    >>> import dqslam as dq
+    >>> recording, truth = dq.simulate(dq.load_scenario("paper"), seed=7)
+    >>> graph = dq.build_graph(recording, box_noise=dq.BoxNoise(pixels=1.0))
+    >>> graph
+    Graph(SE2, 253 poses, 456 boxes of 10 objects)
     """
+    require(recording, Recording, "build_graph", "recording, truth = simulate(scenario, seed=0)")
     box_noise = BoxNoise() if box_noise is None else box_noise
     odometry, detections = recording.odometry, recording.detections
     object_ids, box_object, observations = _objects(detections)
@@ -107,8 +124,21 @@ def solve(
 
     Objects that the landmark model left as no ellipsoid have NaN in `Estimate.ellipsoids`. With a
     robust loss, objects that too few boxes fit are not in the estimate but in `Estimate.dropped`.
+
+    Examples
+    --------
+    >>> import dqslam as dq
+    >>> recording, truth = dq.simulate(dq.load_scenario("paper"), seed=7)
+    >>> graph = dq.build_graph(recording)
+    >>> estimate, summary = dq.solve(graph, dq.SolveOptions(loss=dq.Loss.CAUCHY))
+    >>> estimate
+    Estimate(SE2, 253 poses, 10 objects)
+    >>> summary.converged
+    True
     """
+    require(graph, Graph, "solve", "call build_graph(recording) first")
     options = _core.SolveOptions() if options is None else options
+    require(options, _core.SolveOptions, "solve", "SolveOptions(loss=Loss.CAUCHY)")
     solution = _core.solve(graph.core, options, start)
     initial_poses = graph.core.initial_poses
     dual_quadrics = as_floats("solution.dual_quadrics", solution.dual_quadrics, [None, 9])

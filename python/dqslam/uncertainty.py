@@ -9,8 +9,9 @@ from typing import Any, Literal
 import numpy as np
 
 from dqslam import _core
-from dqslam._checks import Bools, Floats, Ints
+from dqslam._checks import Bools, Floats, Ints, require
 from dqslam._core import LandmarkModel, Mode, SolveOptions
+from dqslam._repr import counted
 from dqslam.estimate import Estimate
 from dqslam.graph import Graph
 from dqslam.metrics import true_rows
@@ -46,6 +47,14 @@ class Marginals:
     under_constrained: tuple[UnderConstrained, ...]
     """One entry for each pose and object that nothing determines."""
 
+    def __repr__(self) -> str:
+        """Show how many poses and objects there are, and of how many nothing is known."""
+        unknown = f", {len(self.under_constrained)} under-constrained"
+        return (
+            f"Marginals({counted(len(self.poses), 'pose')}, {counted(len(self.objects), 'object')}"
+            f"{unknown if self.under_constrained else ''})"
+        )
+
     @property
     def centers(self) -> Floats:
         """Covariances of the objects' centers in the world, m^2, shape (o, 3, 3)."""
@@ -69,6 +78,9 @@ def marginal_covariances(
 
     The options are those of the solve; with a robust loss, boxes that do not fit take no part.
     """
+    call = "marginal_covariances"
+    require(graph, Graph, call, "marginal_covariances(graph, estimate)")
+    require(estimate, Estimate, call, "estimate, summary = solve(graph)")
     options = SolveOptions() if options is None else options
     is_quadric = options.landmark_model == LandmarkModel.DUAL_QUADRIC
     landmarks = estimate.dual_quadrics if is_quadric else estimate.ellipsoids
@@ -83,6 +95,8 @@ def posterior_bound(graph: Graph, truth: Truth) -> Bound:
     Objects that are no ellipsoids have no true parameters: what mapping finds at the true poses
     stands in. Ids are taken for right.
     """
+    require(graph, Graph, "posterior_bound", "call build_graph(recording) first")
+    require(truth, Truth, "posterior_bound", "recording, truth = simulate(scenario, seed=0)")
     options = SolveOptions()
     state = true_state(graph, truth, options)
     covariance = _marginals(graph.core, graph.object_ids, options, state)

@@ -93,7 +93,7 @@ def test_a_table_top_with_images_by_their_numbers(tmp_path, capsys):
     assert (code, said.err) == (0, "")
     assert names(results / "figures" / "images") == ["000703.png", "001001.png"]
     found = load_results(results)
-    assert up_direction(found.world_from_camera).tolist() == [0.0, 0.0, 1.0]
+    assert up_direction(found.poses).tolist() == [0.0, 0.0, 1.0]
 
 
 def test_stills_of_some_frames(tmp_path, capsys, files, images):

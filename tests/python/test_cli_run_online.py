@@ -10,9 +10,9 @@ def test_writes_what_a_run_writes(files, orbit, capsys):  # noqa: F811
     assert call(files, *PERTURB, "--seed", "1", "--ids", "class_id", "--online") == 0
     results = load_results(files[0].parent / "out")
     np.testing.assert_array_equal(results.timestamps, orbit.times)
-    assert sorted(results.objects.id) == sorted(orbit.centers)
-    assert np.isfinite(results.objects.center_covariance).all()
-    assert np.isfinite(results.covariance[1:]).all()
+    assert sorted(results.objects.object_ids) == sorted(orbit.centers)
+    assert np.isfinite(results.objects.center_covariances).all()
+    assert np.isfinite(results.covariances[1:]).all()
     said = report(files)
     error = said["trajectory_error"]
     assert error["after"]["ate_rmse_m"] < 0.4 * error["before"]["ate_rmse_m"]

@@ -45,7 +45,7 @@ def test_a_shifted_object_by_brute_force(results):
         planted.SEMI_AXES,
         planted.TURNS[0].as_quat(),
     )
-    pose = se3_matrix(results.world_from_camera[fits.boxes.pose[row]])
+    pose = se3_matrix(results.poses[fits.boxes.pose[row]])
     expected = bounding_box(planted.CAMERA, pose, surface)
     np.testing.assert_allclose(fits.predicted[row], expected, atol=0.02)
     u_min, v_min, u_max, v_max = fits.boxes.box[row]
@@ -105,13 +105,13 @@ def test_distances_are_those_that_the_evaluation_summarizes(files, results):
 def test_a_planted_error_of_one_pose(files, results):
     """In the world of the truth, which is another one."""
     shift, turn = np.array([0.03, -0.02, 0.01]), Rotation.from_rotvec([0.1, 0.2, -0.3])
-    poses = results.world_from_camera.copy()
+    poses = results.poses.copy()
     in_estimate = planted.TURN.inv()
     poses[7, :3] += in_estimate.apply(shift)
     turned = in_estimate * turn * planted.TURN * Rotation.from_quat(poses[7, 3:])
     poses[7, 3:] = turned.as_quat()
     truth = io.read_trajectory(files.groundtruth)
-    errors = pose_errors(replace(results, world_from_camera=poses), truth)
+    errors = pose_errors(replace(results, poses=poses), truth)
     np.testing.assert_allclose(errors.position[7], shift, atol=1e-6)
     np.testing.assert_allclose(errors.rotation[7], turn.as_rotvec(), atol=1e-6)
     others = np.arange(planted.POSES) != 7
@@ -124,7 +124,7 @@ def test_sigmas_turn_with_the_camera(files, results):
     along_axis = np.diag([1e-4, 4e-4, 9e-4, 1e-6, 4e-6, 9e-6])
     covariance[4] = along_axis
     truth = io.read_trajectory(files.groundtruth)
-    errors = pose_errors(replace(results, covariance=covariance), truth)
+    errors = pose_errors(replace(results, covariances=covariance), truth)
     camera = Rotation.from_quat(truth.world_from_camera[4, 3:]).as_matrix()
     expected = np.sqrt(np.diag(camera @ along_axis[:3, :3] @ camera.T))
     np.testing.assert_allclose(errors.position_sigma[4], expected, rtol=1e-6)
@@ -137,7 +137,7 @@ def test_a_scale_is_that_of_the_truth(tmp_path):
     results = io.load_results(files.results)
     covariance = np.tile(0.01**2 * np.eye(6), (planted.POSES, 1, 1))
     truth = io.read_trajectory(files.groundtruth)
-    errors = pose_errors(replace(results, covariance=covariance), truth, align="sim3")
+    errors = pose_errors(replace(results, covariances=covariance), truth, align="sim3")
     np.testing.assert_allclose(errors.position, 0.0, atol=1e-6)
     np.testing.assert_allclose(errors.position_sigma, 0.02, rtol=1e-6)
     np.testing.assert_allclose(errors.rotation_sigma, 0.01, rtol=1e-6)

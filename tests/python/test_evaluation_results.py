@@ -74,7 +74,7 @@ def test_a_truth_of_a_body_that_looks_elsewhere(files, axis):
 def test_without_alignment_the_world_counts(files):
     found = judged(files, align="none")
     results, truth = io.load_results(files.results), read_trajectory(files.groundtruth)
-    between = results.world_from_camera[:, :3] - truth.world_from_camera[:, :3]
+    between = results.poses[:, :3] - truth.world_from_camera[:, :3]
     assert found["ate"]["mean"] == pytest.approx(np.linalg.norm(between, axis=1).mean())
     assert found["objects"]["matched"] == 0
     assert found["objects"]["center_median"] is None
@@ -131,9 +131,7 @@ def test_without_sizes_classes_and_ids(files, tmp_path):
     keep = [",".join(line.split(",")[2:5]) for line in lines]
     path.write_text("\n".join(keep) + "\n")
     truth, results = io.read_true_objects(path), io.load_results(files.results)
-    motion = align_positions(
-        results.world_from_camera[:, :3], read_trajectory(files.groundtruth)[1][:, :3]
-    )
+    motion = align_positions(results.poses[:, :3], read_trajectory(files.groundtruth)[1][:, :3])
     found = judge_objects(results.objects, truth, motion, gate=0.03)
     assert (found["by_class"], found["matched"], found["moving"]) == (False, 4, 0)
     assert found["pairs"][0]["true_id"] is None
@@ -232,10 +230,10 @@ def test_table_top_is_judged_by_whole_poses(tmp_path):
     assert [found[name] for name in ("matched", "missed", "invented", "moving")] == [6, 0, 0, 2]
     assert found["moving_in_map"] == len(results.objects) - 6
     assert found["center_median"] < 0.02
-    by_positions = align_positions(results.world_from_camera[:, :3], truth[1][:, :3])
-    rows = np.searchsorted(results.objects.id, objects.id[objects.static])
+    by_positions = align_positions(results.poses[:, :3], truth[1][:, :3])
+    rows = np.searchsorted(results.objects.object_ids, objects.id[objects.static])
     errors = center_errors(
-        results.objects.center[rows], objects.center[objects.static], by_positions
+        results.objects.centers[rows], objects.center[objects.static], by_positions
     )
     assert found["center_median"] < 0.9 * np.median(errors)
 

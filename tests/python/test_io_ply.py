@@ -53,23 +53,25 @@ def test_vertices_lie_on_their_ellipsoids_and_the_path_joins_its_poses(tmp_path,
     tables = read(tmp_path / "map.ply")
     vertices, faces = tables["vertex"], tables["face"].astype(int)
     objects = results.objects
-    for row, number in enumerate(objects.id):
+    for row, number in enumerate(objects.object_ids):
         mine = vertices[:, 6] == number
-        turn = Rotation.from_quat(objects.orientation_xyzw[row])
-        inside = turn.inv().apply(vertices[mine, :3] - objects.center[row]) / objects.semi_axes[row]
+        turn = Rotation.from_quat(objects.orientations[row])
+        inside = (
+            turn.inv().apply(vertices[mine, :3] - objects.centers[row]) / objects.semi_axes[row]
+        )
         np.testing.assert_allclose(np.linalg.norm(inside, axis=1), 1.0, atol=1e-4)
         assert (vertices[mine, 3:6] == COLORS[row]).all()
         held = faces[np.isin(faces[:, 1], np.flatnonzero(mine)), 1:]
         assert (faces[:, 0] == 3).all()
         expected = 4.0 / 3.0 * np.pi * np.prod(objects.semi_axes[row])
-        assert volume(vertices[:, :3] - objects.center[row], held) == pytest.approx(
+        assert volume(vertices[:, :3] - objects.centers[row], held) == pytest.approx(
             expected, rel=0.03
         )
     path = vertices[:, 6] == -1
-    np.testing.assert_allclose(vertices[path, :3], results.world_from_camera[:, :3], atol=1e-6)
+    np.testing.assert_allclose(vertices[path, :3], results.poses[:, :3], atol=1e-6)
     first, second = vertices[tables["edge"].astype(int)].swapaxes(0, 1)
-    np.testing.assert_allclose(first[:, :3], results.world_from_camera[:-1, :3], atol=1e-6)
-    np.testing.assert_allclose(second[:, :3], results.world_from_camera[1:, :3], atol=1e-6)
+    np.testing.assert_allclose(first[:, :3], results.poses[:-1, :3], atol=1e-6)
+    np.testing.assert_allclose(second[:, :3], results.poses[1:, :3], atol=1e-6)
 
 
 def test_trimesh_reads_it(tmp_path, results):
@@ -85,8 +87,8 @@ def test_what_is_no_ellipsoid_is_a_point(tmp_path, results):
     results.objects.semi_axes[2] = np.nan
     write_ply(tmp_path / "map.ply", results, COLORS, PATH_COLOR)
     tables = read(tmp_path / "map.ply")
-    mine = tables["vertex"][tables["vertex"][:, 6] == results.objects.id[2]]
-    np.testing.assert_allclose(mine[:, :3], results.objects.center[[2]], atol=1e-6)
+    mine = tables["vertex"][tables["vertex"][:, 6] == results.objects.object_ids[2]]
+    np.testing.assert_allclose(mine[:, :3], results.objects.centers[[2]], atol=1e-6)
     assert len(tables["face"]) == 4 * len(unit_sphere()[1])
 
 

@@ -146,10 +146,10 @@ VARIANCES = np.arange(1.0, 10.0)
 def test_everything_comes_back(tmp_path):
     save_all(tmp_path)
     found = load_results(tmp_path)
-    np.testing.assert_array_equal(found.timestamps, estimate().timestamps)
-    np.testing.assert_array_equal(found.world_from_camera, estimate().poses)
-    np.testing.assert_array_equal(found.odometry, estimate().initial_poses)
+    for name in ("timestamps", "poses", "initial_poses"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(estimate(), name))
     assert found.report == {}
+    assert repr(found) == f"Results('{tmp_path}', 2 poses, 2 objects)"
     boxes = found.boxes
     assert len(boxes) == 4
     np.testing.assert_array_equal(boxes.pose, [0, 0, 1, 1])
@@ -162,13 +162,18 @@ def test_everything_comes_back(tmp_path):
     np.testing.assert_array_equal(boxes.inlier, [True, False, False, False])
     np.testing.assert_array_equal(boxes.held_out, HELD_OUT)
     objects = found.objects
-    np.testing.assert_array_equal(objects.id, [3, 8])
-    assert objects.class_name == ("cup", 'tv "[red]"')
+    np.testing.assert_array_equal(objects.object_ids, [3, 8])
+    assert objects.class_names == estimate().class_names == ("cup", 'tv "[red]"')
     np.testing.assert_array_equal(objects.observations, [12, 5])
     np.testing.assert_array_equal(objects.is_ellipsoid, [True, False])
-    np.testing.assert_allclose(objects.ellipsoids, estimate().ellipsoids, atol=1e-12)
-    np.testing.assert_array_equal(objects.center_covariance[0], np.diag([1.0, 2, 3]))
-    assert np.isnan(objects.center_covariance[1]).all()
+    for name in ("object_ids", "observations", "centers", "semi_axes", "orientations"):
+        np.testing.assert_array_equal(getattr(objects, name), getattr(estimate(), name))
+    for name in ("ellipsoids", "dual_quadrics"):
+        found_rows, rows = getattr(objects, name), getattr(estimate(), name)
+        np.testing.assert_allclose(found_rows, rows, rtol=0.0, atol=1e-12)
+    assert repr(objects) == "MapObjects(2 objects, 1 dropped)"
+    np.testing.assert_array_equal(objects.center_covariances[0], np.diag([1.0, 2, 3]))
+    assert np.isnan(objects.center_covariances[1]).all()
     assert objects.dropped == {4: "too few"}
 
 
@@ -188,7 +193,7 @@ def test_sigma_of_semi_axes_is_that_of_many_draws(tmp_path):
     covariance = factor @ factor.T
     marginals = Marginals(np.zeros((2, 6, 6)), np.array([covariance, covariance]), ())
     save_estimate(estimate(), tmp_path, marginals=marginals)
-    sigma = load_results(tmp_path).objects.log_semi_axes_sigma[0]
+    sigma = load_results(tmp_path).objects.log_semi_axes_sigmas[0]
     draws = random.multivariate_normal(estimate().ellipsoids[0], covariance, 4000)
     axes = np.array([_core.axes_from_ellipsoid(draw)[1] for draw in draws])
     np.testing.assert_allclose(sigma, np.log(axes).std(axis=0), rtol=0.05)
@@ -198,7 +203,7 @@ def test_an_object_that_nothing_determines_has_no_covariance(tmp_path):
     marginals = Marginals(np.zeros((2, 6, 6)), np.full((2, 9, 9), np.nan), ("object 3: free",))
     save_estimate(estimate(), tmp_path, marginals=marginals)
     assert "center_covariance" not in (tmp_path / "map.json").read_text()
-    assert np.isnan(load_results(tmp_path).objects.log_semi_axes_sigma).all()
+    assert np.isnan(load_results(tmp_path).objects.log_semi_axes_sigmas).all()
 
 
 def test_without_boxes_an_older_file_of_them_goes(tmp_path):
@@ -274,12 +279,12 @@ def spd(seed, size):
 def test_covariances_of_poses_come_back(tmp_path):
     poses = np.array([spd(1, 6), np.full((6, 6), np.nan)])
     save_estimate(estimate(), tmp_path, marginals=Marginals(poses, np.zeros((2, 9, 9)), ()))
-    found = load_results(tmp_path).covariance
+    found = load_results(tmp_path).covariances
     np.testing.assert_allclose(found[0], poses[0], rtol=1e-8, atol=1e-20)
     assert np.isnan(found[1]).all()
     save_estimate(estimate(), tmp_path)
     assert not (tmp_path / "covariance.csv").exists()
-    assert np.isnan(load_results(tmp_path).covariance).all()
+    assert np.isnan(load_results(tmp_path).covariances).all()
 
 
 MOUNT = np.array([0.2, -0.1, 0.3, -0.5, 0.5, -0.5, 0.5])
@@ -304,7 +309,7 @@ def test_covariance_of_the_camera_is_that_of_small_motions_of_the_robot(tmp_path
     still = seen(np.repeat(pose, size, axis=0))
     jacobian = _core.minus(_core.PoseModel.SE3, moved, still).T / 1e-5
     expected = jacobian @ covariance @ jacobian.T
-    found = load_results(tmp_path).covariance[1]
+    found = load_results(tmp_path).covariances[1]
     np.testing.assert_allclose(found, expected, rtol=1e-4, atol=1e-4 * expected.max())
 
 

@@ -1,6 +1,7 @@
 """The public names: found when asked for, known to type checkers, and in nobody's way."""
 
 import ast
+import enum
 import subprocess
 import sys
 from pathlib import Path
@@ -9,26 +10,39 @@ from types import ModuleType
 import pytest
 
 import dqslam
+from dqslam import _core, studies
 
 SOURCE = Path(dqslam.__file__)
 
 
-def test_type_checkers_see_the_same_names():
-    tree = ast.parse(SOURCE.read_text())
-    block = next(node for node in tree.body if isinstance(node, ast.If))
-    typed = {
-        alias.asname: node.module
-        for node in block.body
-        if isinstance(node, ast.ImportFrom)
-        for alias in node.names
-    }
-    assert typed == dqslam._HOMES
+def names_for_type_checkers(package):
+    """Give the names that a package imports for type checkers, however the lines are broken."""
+    tree = ast.parse(Path(package.__file__).read_text())
+    (block,) = (node for node in tree.body if isinstance(node, ast.If))
+    return sorted(alias.asname for node in block.body for alias in node.names)
 
 
-@pytest.mark.parametrize("name", dqslam.__all__)
+@pytest.mark.parametrize("package", [dqslam, studies])
+def test_what_type_checkers_see_is_what_there_is(package):
+    assert dir(package) == names_for_type_checkers(package)
+
+
+@pytest.mark.parametrize("name", dir(dqslam))
 def test_every_public_name_is_there(name):
-    assert not isinstance(getattr(dqslam, name), ModuleType)
-    assert name in dir(dqslam)
+    value = getattr(dqslam, name)
+    assert isinstance(value, ModuleType) == (name not in dqslam.__all__)
+    assert getattr(dqslam, name) is value
+
+
+def test_every_choice_of_the_core_is_public():
+    choices = [
+        name
+        for name, value in vars(_core).items()
+        if isinstance(value, type) and issubclass(value, enum.Enum)
+    ]
+    assert len(choices) == 9
+    for name in (*choices, "State"):
+        assert getattr(dqslam, name) is getattr(_core, name)
 
 
 def test_an_unknown_name():
@@ -36,8 +50,8 @@ def test_an_unknown_name():
         dqslam.simulat  # noqa: B018
 
 
-def test_the_package_alone_imports_nothing_heavy():
-    code = "import sys, dqslam; print(*{name.partition('.')[0] for name in sys.modules})"
+def fresh(code):
+    """Run code in a new interpreter that has this package, and return what it prints."""
     path = str(SOURCE.parents[1])
     result = subprocess.run(
         [sys.executable, "-c", f"import sys; sys.path.insert(0, {path!r}); {code}"],
@@ -45,4 +59,22 @@ def test_the_package_alone_imports_nothing_heavy():
         text=True,
         check=True,
     )
-    assert not {"numpy", "scipy", "pydantic", "typer"} & set(result.stdout.split())
+    return result.stdout.split()
+
+
+def test_the_package_alone_imports_nothing_heavy():
+    found = fresh("import sys, dqslam; print(*{name.partition('.')[0] for name in sys.modules})")
+    assert "dqslam" in found
+    assert not {"numpy", "scipy", "pydantic", "typer"} & set(found)
+
+
+def test_subpackages_need_no_import_of_their_own():
+    code = "import dqslam as dq; print(dq.io.__name__, dq.studies.sweep.__name__)"
+    assert fresh(code) == ["dqslam.io", "dqslam.studies.sweep"]
+
+
+def test_a_star_hides_no_module():
+    assert fresh("import io; from dqslam import *; print(io.__name__, Mode.SLAM)") == [
+        "io",
+        "Mode.SLAM",
+    ]

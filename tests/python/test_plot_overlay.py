@@ -74,18 +74,18 @@ def test_pixels_of_the_outline_are_painted(tmp_path, results, images):
 
 def _outline(results, pose, number):
     """Project points of the ellipsoid's rim: the dual conic in plain numpy."""
-    row = int(np.flatnonzero(results.objects.id == number)[0])
+    row = int(np.flatnonzero(results.objects.object_ids == number)[0])
     quadric = _core.dual_quadric_matrix(
         _core.dual_quadric_from_ellipsoid(results.objects.ellipsoids[row])
     )
     world_from_camera = np.eye(4)
-    x, y, z, w = results.world_from_camera[pose, 3:]
+    x, y, z, w = results.poses[pose, 3:]
     world_from_camera[:3, :3] = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
         [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
         [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
     ]
-    world_from_camera[:3, 3] = results.world_from_camera[pose, :3]
+    world_from_camera[:3, 3] = results.poses[pose, :3]
     camera = results.camera
     k = np.array([[camera.fx, 0, camera.cx], [0, camera.fy, camera.cy], [0, 0, 1]])
     projection = k @ np.linalg.inv(world_from_camera)[:3]

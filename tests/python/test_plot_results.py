@@ -35,8 +35,8 @@ def results(files):
     found = io.load_results(files.results)
     covariance = np.tile(np.diag([1e-4] * 3 + [1e-6] * 3), (planted.POSES, 1, 1))
     spread = np.tile(4e-4 * np.eye(3), (len(found.objects), 1, 1))
-    objects = replace(found.objects, center_covariance=spread)
-    return replace(found, covariance=covariance, objects=objects)
+    objects = replace(found.objects, center_covariances=spread)
+    return replace(found, covariances=covariance, objects=objects)
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +50,7 @@ def lines(axes, kind):
 
 def map_truth(results, truth, files=None):
     poses = truth.world_from_camera
-    alignment = align_poses(results.world_from_camera, poses, lever=1.0)
+    alignment = align_poses(results.poses, poses, lever=1.0)
     objects = None if files is None else io.read_true_objects(files.objects)
     return MapTruth(truth.timestamps, poses, objects, alignment)
 
@@ -93,16 +93,16 @@ def test_frequent_classes_have_the_first_colors_and_none_two():
 def test_the_map_has_every_object_where_it_is(results):
     figure = draw_results_map(results)
     (axes,) = figure.axes
-    view = from_above(results.world_from_camera)
+    view = from_above(results.poses)
     outlines = lines(axes, "object")
     assert len(outlines) == len(results.objects) == 5
     for row, one in enumerate(outlines):
-        middle = view.points(results.objects.center[[row]])[0]
+        middle = view.points(results.objects.centers[[row]])[0]
         np.testing.assert_allclose(one[:-1].mean(axis=0), middle, atol=1e-9)
     (path,) = lines(axes, "estimate")
-    np.testing.assert_allclose(path, view.points(results.world_from_camera[:, :3]))
+    np.testing.assert_allclose(path, view.points(results.poses[:, :3]))
     (odometry,) = lines(axes, "odometry")
-    np.testing.assert_allclose(odometry, view.points(results.odometry[:, :3]))
+    np.testing.assert_allclose(odometry, view.points(results.initial_poses[:, :3]))
     assert not lines(axes, "truth")
 
 
@@ -117,8 +117,10 @@ def test_covariances_are_circles_of_two_sigmas(results):
 
 
 def test_unknown_covariances_are_not_drawn(results):
-    objects = replace(results.objects, center_covariance=np.full((5, 3, 3), np.nan))
-    unknown = replace(results, objects=objects, covariance=np.full_like(results.covariance, np.nan))
+    objects = replace(results.objects, center_covariances=np.full((5, 3, 3), np.nan))
+    unknown = replace(
+        results, objects=objects, covariances=np.full_like(results.covariances, np.nan)
+    )
     (axes,) = draw_results_map(unknown).axes
     assert not lines(axes, "object covariance")
     assert not lines(axes, "pose covariance")
@@ -132,8 +134,8 @@ def test_with_the_truth_the_map_is_in_its_world(files, results, truth):
     np.testing.assert_allclose(true_path, view.points(truth.world_from_camera[:, :3]))
     # Filled: the mapped objects, and those of the truth that stand still.
     assert len(axes.patches) == 5 + 5
-    (perfect,) = [one for one, name in zip(lines(axes, "object"), results.objects.id, strict=True)
-                  if name == 14]  # fmt: skip
+    named = zip(results.objects.object_ids, lines(axes, "object"), strict=True)
+    (perfect,) = [one for number, one in named if number == 14]
     center = planted.TURN.apply(planted.CENTERS[4]) + planted.SHIFT
     np.testing.assert_allclose(perfect[:-1].mean(axis=0), view.points(center[None])[0], atol=1e-6)
 
@@ -158,16 +160,16 @@ def test_names_do_not_cover_each_other(results):
 
 
 def test_a_diverged_odometry_does_not_shrink_the_map(results):
-    far = results.odometry.copy()
+    far = results.initial_poses.copy()
     far[:, :2] += 1e5
-    (axes,) = draw_results_map(replace(results, odometry=far)).axes
+    (axes,) = draw_results_map(replace(results, initial_poses=far)).axes
     assert np.ptp(axes.get_xlim()) < 10.0
 
 
 def test_errors_and_their_band(results, truth):
-    poses = results.world_from_camera.copy()
+    poses = results.poses.copy()
     poses[7, :3] += planted.TURN.inv().apply([0.03, 0.0, 0.0])
-    errors = pose_errors(replace(results, world_from_camera=poses), truth)
+    errors = pose_errors(replace(results, poses=poses), truth)
     figure = draw_errors(errors, "position")
     assert [axes.get_ylabel() for axes in figure.axes] == [
         "distance [m]", "x [m]", "y [m]", "z [m]"
@@ -302,14 +304,15 @@ def test_nothing_is_written_when_something_fails(tmp_path, results, truth):
 def test_an_unmoved_world_without_objects(tmp_path, results):
     none = np.zeros(0, dtype=int)
     objects = io.MapObjects(
-        id=none,
-        class_name=(),
-        center=np.zeros((0, 3)),
+        object_ids=none,
+        class_names=(),
+        centers=np.zeros((0, 3)),
         semi_axes=np.zeros((0, 3)),
-        orientation_xyzw=np.zeros((0, 4)),
+        orientations=np.zeros((0, 4)),
+        dual_quadrics=np.zeros((0, 9)),
         observations=none,
-        center_covariance=np.zeros((0, 3, 3)),
-        log_semi_axes_sigma=np.zeros((0, 3)),
+        center_covariances=np.zeros((0, 3, 3)),
+        log_semi_axes_sigmas=np.zeros((0, 3)),
     )
     figure = draw_results_map(replace(results, objects=objects))
     assert not lines(figure.axes[0], "object")

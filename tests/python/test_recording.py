@@ -41,6 +41,19 @@ def positions(**changes):
     return RelativePositions(**values | changes)
 
 
+def xyxy(**changes):
+    values = {"pose": [0, 2], "xyxy": [[10.5, 10.5, 50.5, 60.5], [100.5, 100.5, 200.5, 150.5]]}
+    return Detections.from_xyxy(**values | changes)
+
+
+def from_poses(**changes):
+    values = {
+        "poses": [[1.0, 2.0, 0.0], [2.0, 2.0, np.pi / 2], [2.0, 5.0, np.pi]],
+        "covariance": np.diag([0.04, 0.01, 0.09]),
+    }
+    return Odometry.from_poses(**values | changes)
+
+
 def recording(**changes):
     values = {
         "camera": CAMERA,
@@ -122,6 +135,24 @@ HALF_TURN = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.1]
             {"truncated": [[0, 1, 0, 0], [0, 0, 2, 0]]},
             r"truncated row 1: not true or false: \[0, 0, 2, 0\]",
         ),
+        (
+            xyxy,
+            {"pose": [0]},
+            r"^pose: expected shape \(2\), got \(1,\)",
+        ),
+        (xyxy, {"xyxy": [[0, 0, 9, 9], [0, 0, 9]]}, r"^xyxy: not an array of numbers"),
+        (xyxy, {"xyxy": [[0, 0, 9, 9], [0, 0, 9, np.nan]]}, r"^xyxy row 1: not finite"),
+        (xyxy, {"score": [1.0]}, r"^score: expected shape \(2\), got \(1,\)"),
+        (xyxy, {"object_id": [1, 0.5]}, r"^object_id row 1: not a whole number: 0\.5"),
+        (xyxy, {"class_id": [0, 2], "class_names": ["cup"]}, r"class_id row 1: class has no name"),
+        (from_poses, {"poses": np.zeros((3, 4))}, r"^poses: expected 3 .* got shape \(3, 4\)"),
+        (from_poses, {"poses": []}, r"^poses: expected 3 \(SE2\) or 7 \(SE3\)"),
+        (from_poses, {"poses": np.zeros((0, 3))}, r"^poses: there are none"),
+        (from_poses, {"poses": [[0, 0, 0], [0, np.inf, 0]]}, r"^poses row 1: not finite"),
+        (from_poses, {"poses": [HALF_TURN]}, r"^poses row 0: quaternion is not of unit length"),
+        (from_poses, {"covariance": np.eye(6)}, r"covariance: expected shape \(3, 3\), got \(6"),
+        (from_poses, {"covariance": [np.eye(3)] * 3}, r"covariance: expected shape \(2, 3, 3\)"),
+        (from_poses, {"covariance": -np.eye(3)}, r"covariance row 0: .*positive definite"),
         (positions, {"covariance": [-np.eye(3)]}, r"positions\.covariance row 0: .*positive def"),
         (positions, {"object_in_robot": [[1.0, 2.0]]}, r"object_in_robot: expected shape \(n, 3"),
         (recording, {"timestamps": [0.0, 1.0, 1.0]}, r"timestamps row 2: time does not increase"),
@@ -169,3 +200,81 @@ def test_undistorted_boxes_may_lie_outside_of_the_rectangle_of_the_image():
 def test_a_replaced_part_is_checked_again():
     with pytest.raises(ValueError, match="timestamps row 1"):
         replace(recording(), timestamps=[0.0, -1.0, 1.0])
+
+
+def test_odometry_from_poses_of_the_plane():
+    made = from_poses()
+    assert made.pose_model == PoseModel.SE2
+    assert made.first_pose.tolist() == [1.0, 2.0, 0.0]
+    expected = [[1.0, 0.0, np.pi / 2], [3.0, 0.0, np.pi / 2]]  # the second drive is due north
+    np.testing.assert_allclose(made.relative, expected, atol=1e-15)
+    assert made.covariance.tolist() == [np.diag([0.04, 0.01, 0.09]).tolist()] * 2
+    each = np.array([np.eye(3), 2.0 * np.eye(3)])
+    np.testing.assert_array_equal(from_poses(covariance=each).covariance, each)
+
+
+def test_odometry_from_poses_in_space():
+    half = np.sqrt(0.5)
+    rounded = [0.0, 0.0, 0.7071, 0.7071]  # as a file of four digits has it: 1e-5 too short
+    made = from_poses(
+        poses=[[0.0, 0.0, 1.0, *rounded], [0.0, 2.0, 1.0, *rounded], [0.0, 2.0, 1.5, 0, 0, 0, 1]],
+        covariance=np.eye(6),
+    )
+    assert made.pose_model == PoseModel.SE3
+    expected = [[2.0, 0.0, 0.0, 0, 0, 0, 1], [0.0, 0.0, 0.5, 0, 0, -half, half]]
+    np.testing.assert_allclose(made.relative, expected, atol=1e-9)
+    np.testing.assert_allclose(np.linalg.norm(made.first_pose[3:]), 1.0, atol=1e-15)
+
+
+def test_a_single_pose_has_no_steps():
+    made = from_poses(poses=[[0.0, 0.0, 0.0]])
+    assert (made.relative.shape, made.covariance.shape) == ((0, 3), (0, 3, 3))
+
+
+def test_detections_from_corners():
+    made = xyxy()
+    assert made.box.tolist() == [[10.0, 10.0, 50.0, 60.0], [100.0, 100.0, 200.0, 150.0]]
+    assert (made.score.tolist(), made.object_id.tolist()) == ([1.0, 1.0], [-1, -1])
+    assert (made.class_id.tolist(), made.class_names) == ([0, 0], {0: "object"})
+    assert xyxy(pose=2).pose.tolist() == [2, 2]
+    assert xyxy(object_id=7).object_id.tolist() == [7, 7]
+    assert xyxy(score=[0.5, 0.25]).score.tolist() == [0.5, 0.25]
+    assert xyxy(class_id=[3, 5]).class_names == {3: "3", 5: "5"}
+    assert xyxy(class_id=[0, 1], class_names=["cup", "book"]).class_names == {0: "cup", 1: "book"}
+    assert xyxy(class_id=4, class_names={4: "cup"}).class_names == {4: "cup"}
+    assert Detections.from_xyxy([], []).box.shape == (0, 4)
+
+
+def test_detections_from_corners_in_distorted_images():
+    lens = Camera(500.0, 500.0, 319.5, 239.5, 640, 480, distortion=[-0.3, 0.1, 0.0, 0.0, 0.0])
+    made = xyxy(camera=lens)
+    np.testing.assert_array_equal(made.box, lens.undistort_boxes(xyxy().box))
+    assert made.box[0, 0] < -10.0
+
+
+@pytest.mark.parametrize(
+    ("made", "text"),
+    [
+        (odometry(), "Odometry(SE2, 2 steps)"),
+        (
+            from_poses(poses=[[0, 0, 0, 0, 0, 0, 1]] * 2, covariance=np.eye(6)),
+            "Odometry(SE3, 1 step)",
+        ),
+        (detections(), "Detections(2 boxes of 1 object, 1 without id, 1 class)"),
+        (detections(object_id=[7, 8]), "Detections(2 boxes of 2 objects, 1 class)"),
+        (xyxy(class_id=[1, 2]), "Detections(2 boxes without ids, 2 classes)"),
+        (Detections.from_xyxy([], []), "Detections(0 boxes)"),
+        (positions(), "RelativePositions(1 position of 1 object)"),
+        (
+            recording(positions=None),
+            "Recording(SE2, 3 poses, 2 boxes of 1 object, 1 without id, 1 class)",
+        ),
+        (
+            recording(detections=detections(object_id=[1, 2])),
+            "Recording(SE2, 3 poses, 2 boxes of 2 objects, 1 class, 1 position)",
+        ),
+        (truth(), "Truth(SE2, 3 poses, 2 objects)"),
+    ],
+)
+def test_what_there_is_in_a_line(made, text):
+    assert repr(made) == text

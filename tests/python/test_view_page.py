@@ -39,8 +39,8 @@ def web_server(folder):
 def scene(tmp_path_factory):
     files = planted.write_planted(tmp_path_factory.mktemp("results"), drift=0.3)
     results = load_results(files.results)
-    results.objects.center_covariance[:2] = np.diag([1e-4, 4e-4, 9e-4])
-    results.covariance[5:8] = 1e-4 * np.eye(6)
+    results.objects.center_covariances[:2] = np.diag([1e-4, 4e-4, 9e-4])
+    results.covariances[5:8] = 1e-4 * np.eye(6)
     return build_scene(
         results,
         groundtruth=read_trajectory(files.groundtruth),

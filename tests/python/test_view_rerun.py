@@ -37,17 +37,17 @@ def test_what_is_logged(files, tmp_path):
     results = load_results(files.results)
     objects = columns["/world/objects"]
     (centers,) = objects["Ellipsoids3D:centers"]
-    np.testing.assert_allclose(centers, results.objects.center, atol=1e-6)
+    np.testing.assert_allclose(centers, results.objects.centers, atol=1e-6)
     (half_sizes,) = objects["Ellipsoids3D:half_sizes"]
     np.testing.assert_allclose(half_sizes, results.objects.semi_axes, rtol=1e-6)
     assert objects["Ellipsoids3D:labels"] == [["cup 10", "book 11", "lamp 12", "box 14", "cup 99"]]
     (strips,) = columns["/world/estimate"]["LineStrips3D:strips"]
-    np.testing.assert_allclose(strips[0], results.world_from_camera[:, :3], atol=1e-6)
+    np.testing.assert_allclose(strips[0], results.poses[:, :3], atol=1e-6)
     assert len(columns["/world/true_objects"]["Ellipsoids3D:centers"][0]) == 6
     assert {"/world/odometry", "/world/truth", "/world/true_objects"} <= set(columns)
     camera = columns["/world/camera"]
     places = [row[0] for row in camera["Transform3D:translation"] if row]
-    np.testing.assert_allclose(places, results.world_from_camera[:, :3], atol=1e-6)
+    np.testing.assert_allclose(places, results.poses[:, :3], atol=1e-6)
     boxes = columns["/world/camera/boxes"]
     assert boxes["image"] == list(range(planted.POSES))
     corners = np.array(boxes["Boxes2D:centers"]) - np.array(boxes["Boxes2D:half_sizes"])

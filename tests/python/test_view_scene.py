@@ -107,12 +107,12 @@ def test_the_spread_is_an_ellipsoid_of_the_covariance(files):
 def test_spreads_of_poses_are_turned_into_the_world(files):
     """The file has them in the frames of the cameras; the first is exact, and not all are known."""
     results = load_results(files.results)
-    results.covariance[:] = np.nan
-    results.covariance[0] = 0.0
-    results.covariance[5] = np.diag([0.01, 0.04, 0.09, 1.0, 1.0, 1.0])
+    results.covariances[:] = np.nan
+    results.covariances[0] = 0.0
+    results.covariances[5] = np.diag([0.01, 0.04, 0.09, 1.0, 1.0, 1.0])
     (spread,) = build_scene(results).pose_spreads
-    turn = Rotation.from_quat(results.world_from_camera[5, 3:]).as_matrix()
-    np.testing.assert_allclose(spread.center, results.world_from_camera[5, :3])
+    turn = Rotation.from_quat(results.poses[5, 3:]).as_matrix()
+    np.testing.assert_allclose(spread.center, results.poses[5, :3])
     expected = 9.0 * sum(
         v * np.outer(a, a) for v, a in zip([0.01, 0.04, 0.09], turn.T, strict=True)
     )
@@ -165,7 +165,7 @@ def test_without_boxes_or_truth(files):
     results = load_results(files.results)
     scene = build_scene(results)
     assert (len(scene.boxes), scene.truth, scene.true_objects) == (0, (), ())
-    length = sum(map(np.linalg.norm, np.diff(results.world_from_camera[:, :3], axis=0)))
+    length = sum(map(np.linalg.norm, np.diff(results.poses[:, :3], axis=0)))
     shown = {"poses": f"20 over {length:.4g} m", "objects": "5 mapped, 1 not"}
     assert dict(scene.overview) == shown
     assert draw_image(scene, 3).count("<rect") == 0

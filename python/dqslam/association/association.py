@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dqslam import _core
-from dqslam._checks import Bools, Ints, reject_rows
+from dqslam._checks import Bools, Ints, reject_rows, require
+from dqslam._repr import counted
 from dqslam.association.follow import Follower
 from dqslam.association.initiation import MIN_VIEWS
 from dqslam.association.keyframes import choose_keyframes
@@ -19,6 +20,7 @@ from dqslam.association.scene_map import SceneMap
 from dqslam.association.thinning import fill_in, thin_recording
 from dqslam.association.tracklets import link_tracklets
 from dqslam.assumptions import BoxNoise, SizePrior, SizePriors
+from dqslam.graph import Graph, build_graph
 from dqslam.recording import Recording
 
 # Trust in ids that are final, and the most where they are not: of tracklets that are linked in the
@@ -40,6 +42,44 @@ class Association:
     """Ids of the objects, -1 for one that was given up, shape (o,)."""
     left_out: dict[int, str]
     """Ids of objects that do not fit a world at rest, and why. Their boxes keep the ids."""
+
+    def __repr__(self) -> str:
+        """Show how many objects there are, and how many of the boxes show one."""
+        shown = int(np.sum(self.object_id >= 0))
+        boxes = f"{shown} of {counted(len(self.object_id), 'box')}"
+        left_out = f", {len(self.left_out)} left out" if self.left_out else ""
+        return f"Association({counted(int(np.sum(self.ids >= 0)), 'object')}, {boxes}{left_out})"
+
+    def build_graph(self) -> Graph:
+        """Lay out the keyframes and the objects at rest, by their ids, as ``solve`` needs them.
+
+        Box noise, size prior and the level of the odometry's noise are those of the association.
+
+        Raises
+        ------
+        ValueError
+            When no object was found.
+        """
+        scene = self.scene
+        names = np.append(self.ids, -1)
+        names[list(scene.left_out)] = -1
+        object_id = names[scene.box_object]
+        used = object_id >= 0
+        if not used.any():
+            raise ValueError("associate has found no object at rest: there is nothing to solve")
+        boxes = scene.recording.detections.select(used)
+        detections = replace(boxes, object_id=object_id[used])
+        return build_graph(
+            replace(scene.recording, detections=detections),
+            box_noise=scene.box_noise,
+            size_prior=scene.size_prior,
+        )
+
+    def start(self, graph: Graph) -> _core.State:
+        """Return the poses and objects of such a graph as the association has estimated them."""
+        row_of = {number: row for row, number in enumerate(self.ids.tolist())}
+        rows = [row_of[number] for number in graph.object_ids.tolist()]
+        return _core.State(self.scene.poses, self.scene.ellipsoids[rows])
 
 
 def associate(
@@ -78,7 +118,21 @@ def associate(
     ------
     ValueError
         For a trust out of range, or at 1 for boxes without an id.
+
+    Examples
+    --------
+    A camera that is carried half around a table, and boxes whose ids are not trusted:
+
+    >>> import dqslam as dq
+    >>> scenario = dq.load_scenario("orbit")
+    >>> path = scenario.path.model_copy(update={"turns": 0.5, "poses": 30})
+    >>> recording, truth = dq.simulate(scenario.model_copy(update={"path": path}), seed=1)
+    >>> found = dq.associate(recording, trust=0.9)
+    >>> graph = found.build_graph()
+    >>> dq.solve(graph, start=found.start(graph))[0]
+    Estimate(SE3, 30 poses, 8 objects)
     """
+    require(recording, Recording, "associate", "recording, dropped = load_recording(...)")
     if not 0.5 < trust <= FINAL:
         raise ValueError(f"trust in ids is {trust:g}, not above 0.5 and at most 1")
     tracker_ids = recording.detections.object_id

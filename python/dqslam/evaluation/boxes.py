@@ -33,13 +33,13 @@ def judge_reprojection(results: Results) -> dict[str, Any] | None:
 def box_overlaps(results: Results, boxes: BoxTable) -> Floats:
     """Return the IoU of each box with its projected object, (m,); NaN where that is not mapped."""
     objects = results.objects
-    row_of = {int(number): row for row, number in enumerate(objects.id)}
+    row_of = {int(number): row for row, number in enumerate(objects.object_ids)}
     row = np.array([row_of.get(int(number), -1) for number in boxes.object_id], dtype=np.int64)
     mapped = row >= 0
     overlap = np.full(len(boxes), np.nan)
     overlap[mapped] = reprojection_iou(
         results.camera,
-        results.world_from_camera[boxes.pose[mapped]],
+        results.poses[boxes.pose[mapped]],
         objects.ellipsoids[row[mapped]],
         boxes.box[mapped],
         boxes.truncated[mapped],

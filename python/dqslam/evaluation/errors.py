@@ -48,7 +48,7 @@ def pose_errors(
     from scipy.spatial.transform import Rotation
 
     rows, true_rows = common_poses(results.timestamps, groundtruth, max_time_difference)
-    poses, true_poses = results.world_from_camera[rows], groundtruth.world_from_camera[true_rows]
+    poses, true_poses = results.poses[rows], groundtruth.world_from_camera[true_rows]
 
     def distance(positions: Floats) -> Floats:
         moved = align_positions(positions, true_poses[:, :3], align).apply(positions)
@@ -58,11 +58,11 @@ def pose_errors(
     moved = start.apply_poses(poses)
     turn = Rotation.from_quat(moved[:, 3:])
     in_world = turn.as_matrix()
-    covariance = results.covariance[rows]
+    covariance = results.covariances[rows]
     return PoseErrors(
         timestamps=results.timestamps[rows],
         distance=distance(poses[:, :3]),
-        odometry_distance=distance(results.odometry[rows, :3]),
+        odometry_distance=distance(results.initial_poses[rows, :3]),
         position=moved[:, :3] - true_poses[:, :3],
         position_sigma=start.scale * _sigmas(in_world, covariance[:, :3, :3]),
         rotation=(turn * Rotation.from_quat(true_poses[:, 3:]).inv()).as_rotvec(),

@@ -59,9 +59,9 @@ def evaluate_results(
             poses[rows], true_poses, align=align, rpe_delta=rpe_delta, rpe_unit=rpe_unit
         )
 
-    ate, rpe = judged(results.world_from_camera)
-    odometry_ate, odometry_rpe = judged(results.odometry)
-    alignment, by = object_alignment(results, results.world_from_camera[rows], true_poses, align)
+    ate, rpe = judged(results.poses)
+    odometry_ate, odometry_rpe = judged(results.initial_poses)
+    alignment, by = object_alignment(results, results.poses[rows], true_poses, align)
     object_errors, association = None, None
     if objects is not None:
         object_errors = judge_objects(results.objects, objects, alignment, match=match, gate=gate)
@@ -98,8 +98,8 @@ def object_alignment(
     """
     from scipy.spatial.transform import Rotation
 
-    path = results.world_from_camera[:, :3]
-    nearest = [np.linalg.norm(path - center, axis=1).min() for center in results.objects.center]
+    path = results.poses[:, :3]
+    nearest = [np.linalg.norm(path - center, axis=1).min() for center in results.objects.centers]
     lever = float(np.median(nearest)) if nearest else 0.0
     found = align_poses(poses, true_poses, align, lever=lever if lever > 0.0 else 1.0)
     turns, true_turns = (

@@ -65,7 +65,7 @@ def fit_boxes(results: Results) -> BoxFits:
     boxes, objects = results.boxes, results.objects
     if boxes is None:
         raise ValueError(f"{results.directory}: there is no boxes.csv")
-    row_of = {int(number): row for row, number in enumerate(objects.id)}
+    row_of = {int(number): row for row, number in enumerate(objects.object_ids)}
     row = np.array([row_of.get(int(number), -1) for number in boxes.object_id], dtype=np.int64)
     mapped = np.flatnonzero(row >= 0)
     ellipsoids = objects.ellipsoids[row[mapped]]
@@ -73,7 +73,7 @@ def fit_boxes(results: Results) -> BoxFits:
     box, in_front = _core.project_to_boxes(
         _core.PoseModel.SE3,
         results.camera,
-        results.world_from_camera[boxes.pose[mapped[real]]],
+        results.poses[boxes.pose[mapped[real]]],
         ellipsoids[real],
     )
     predicted = np.full((len(boxes), 4), np.nan)

@@ -48,7 +48,7 @@ def judge_objects(
         How far from a true object a match may be, meters; by default its longest side, or
         ``GATE_WITHOUT_SIZES``.
     """
-    centers = alignment.apply(objects.center)
+    centers = alignment.apply(objects.centers)
     class_names = _comparable_classes(objects, truth)
     free = np.ones(len(objects), dtype=np.bool_)
     standing = _match(objects, truth, centers, class_names, match, gate, free, truth.static)
@@ -57,9 +57,9 @@ def judge_objects(
     errors = np.linalg.norm(centers[standing.row] - truth.center[standing.true_row], axis=1)
     pairs = [
         {
-            "id": int(objects.id[row]),
+            "id": int(objects.object_ids[row]),
             "true_id": None if truth.id is None else int(truth.id[true_row]),
-            "class_name": objects.class_name[row],
+            "class_name": objects.class_names[row],
             "center": float(error),
             **_compare_shapes(objects, row, truth, true_row, alignment),
         }
@@ -90,7 +90,7 @@ def _comparable_classes(objects: MapObjects, truth: TrueObjects) -> tuple[str, .
         return None
     have, true = (
         {name.strip().casefold() for name in names}
-        for names in (objects.class_name, truth.class_name)
+        for names in (objects.class_names, truth.class_name)
     )
     return truth.class_name if have & true else None
 
@@ -110,14 +110,14 @@ def _match(
     if match == "id":
         if truth.id is None:
             raise ValueError(f"{truth.path}: there are no ids to match by")
-        found = match_by_id(objects.id[mapped], truth.id[rows])
+        found = match_by_id(objects.object_ids[mapped], truth.id[rows])
     elif match == "nearest":
         gates = np.full(len(truth), GATE_WITHOUT_SIZES)
         if gate is not None:
             gates[:] = gate
         elif truth.size is not None:
             gates = truth.size.max(axis=1)
-        names = [objects.class_name[row] for row in mapped]
+        names = [objects.class_names[row] for row in mapped]
         true_names = None if class_names is None else [class_names[row] for row in rows]
         found = match_nearest(centers[mapped], names, truth.center[rows], true_names, gates[rows])
     else:
@@ -144,13 +144,13 @@ def _compare_shapes(
     if truth.rotation is None:
         return sizes
     world_from_object = Rotation.from_matrix(alignment.rotation) * Rotation.from_quat(
-        objects.orientation_xyzw[row]
+        objects.orientations[row]
     )
     true_rotation = truth.rotation[true_row]
     angle = orientation_error(
         world_from_object.as_matrix(), semi_axes, true_rotation, true_semi_axes
     )
-    (center,) = alignment.apply(objects.center[[row]])
+    (center,) = alignment.apply(objects.centers[[row]])
     ellipsoid = _core.ellipsoid_from_axes(center, semi_axes, world_from_object.as_quat())
     true_ellipsoid = _core.ellipsoid_from_axes(
         truth.center[true_row], true_semi_axes, Rotation.from_matrix(true_rotation).as_quat()

@@ -68,7 +68,7 @@ def unit_sphere() -> tuple[Floats, Ints]:
 def _lines(
     results: Results, colors: Sequence[tuple[int, int, int]], trajectory_color: tuple[int, int, int]
 ) -> Iterator[str]:
-    objects, path = results.objects, results.world_from_camera[:, :3]
+    objects, path = results.objects, results.poses[:, :3]
     sphere, triangles = unit_sphere()
     bodies = [_body(results, row, sphere) for row in range(len(objects))]
     meshed = int(objects.is_ellipsoid.sum())
@@ -82,7 +82,7 @@ def _lines(
         f"element edge {max(len(path) - 1, 0)}\nproperty int vertex1\nproperty int vertex2\n"
         "end_header\n"
     )
-    for body, color, number in zip(bodies, colors, objects.id, strict=True):
+    for body, color, number in zip(bodies, colors, objects.object_ids, strict=True):
         yield from _vertices(body, color, int(number))
     yield from _vertices(path, trajectory_color, -1)
     first = 0
@@ -99,10 +99,10 @@ def _body(results: Results, row: int, sphere: Floats) -> Floats:
 
     objects = results.objects
     if not objects.is_ellipsoid[row]:
-        return objects.center[[row]]
-    world_from_object = Rotation.from_quat(objects.orientation_xyzw[row])
+        return objects.centers[[row]]
+    world_from_object = Rotation.from_quat(objects.orientations[row])
     scaled = sphere * objects.semi_axes[row]
-    return np.asarray(world_from_object.apply(scaled) + objects.center[row])
+    return np.asarray(world_from_object.apply(scaled) + objects.centers[row])
 
 
 def _vertices(points: Floats, color: tuple[int, int, int], number: int) -> Iterator[str]:

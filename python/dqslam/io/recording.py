@@ -82,6 +82,21 @@ def load_recording(
         Names of the formats, where files do not look like what they are.
     frames
         Times of the frames, for files that only count them: see ``choose_frame_times``.
+
+    Examples
+    --------
+    Files as a robot may have them, here those of a simulated drive:
+
+    >>> import dqslam as dq
+    >>> simulated, truth = dq.simulate(dq.load_scenario("paper"), seed=7)
+    >>> dq.io.save_recording(simulated, "drive")
+    >>> recording, dropped = dq.load_recording(
+    ...     "drive/camera.json", "drive/odometry.txt", "drive/boxes.csv"
+    ... )
+    >>> recording
+    Recording(SE3, 253 poses, 456 boxes of 10 objects, 1 class)
+    >>> dropped.few_boxes
+    {}
     """
     if not 0 <= min_score <= 1:
         raise ValueError(f"min_score is {min_score:g}, not between 0 and 1")
@@ -106,21 +121,14 @@ def load_recording(
     )
     if not rows.size:
         raise FileError(detections, _nothing_left(table, dropped, ids, tolerance, times))
-    model = _core.PoseModel.SE3
-    steps = len(path) - 1
-    covariance = (odometry_noise or OdometryNoise()).covariance(steps)
+    covariance = (odometry_noise or OdometryNoise()).covariance(len(path) - 1)
     if odometry_covariance is not None:
         covariance = read_step_covariances(odometry_covariance, times)
     classes = dict(zip(table.class_id.tolist(), table.class_name, strict=True))
     recording = Recording(
         camera=lens,
         timestamps=times,
-        odometry=Odometry(
-            pose_model=model,
-            first_pose=path[0],
-            relative=_core.between(model, path[:-1], path[1:]),
-            covariance=covariance,
-        ),
+        odometry=Odometry.from_poses(path, covariance=covariance),
         detections=Detections(
             pose=pose[rows],
             box=_undistorted(lens, camera, table, rows),

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dqslam._checks import Floats, Ints
+from dqslam._checks import Floats, Ints, require
 from dqslam._core import PoseModel
 from dqslam.estimate import Estimate
 from dqslam.metrics.alignment import same_shape
@@ -46,7 +46,19 @@ class Report:
 
 
 def evaluate(estimate: Estimate, truth: Truth) -> Report:
-    """Compare an estimate with the truth, object by object id, without any alignment."""
+    """Compare an estimate with the truth, object by object id, without any alignment.
+
+    Examples
+    --------
+    >>> import dqslam as dq
+    >>> recording, truth = dq.simulate(dq.load_scenario("paper"), seed=7)
+    >>> estimate, summary = dq.solve(dq.build_graph(recording))
+    >>> report = dq.evaluate(estimate, truth)
+    >>> report.rmse_pos < 0.1 < 1.0 < report.odometry_rmse_pos
+    True
+    """
+    require(estimate, Estimate, "evaluate", "estimate, summary = solve(graph)")
+    require(truth, Truth, "evaluate", "recording, truth = simulate(scenario, seed=0)")
     rows = true_rows(estimate.object_ids, truth)
     volume_errors = np.abs(cube_volumes(estimate.shapes) - truth.volume[rows])
     real = estimate.is_ellipsoid

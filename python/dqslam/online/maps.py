@@ -57,19 +57,19 @@ def load_map(directory: str | Path, robot_from_camera: ArrayLike | None = None) 
         raise FileError(Path(directory) / "map.json", "has no ellipsoid to find the way by")
     covariances = np.zeros((len(rows), 9, 9))
     for covariance, row in zip(covariances, rows, strict=True):
-        center, sigma = objects.center_covariance[row], objects.log_semi_axes_sigma[row]
+        center, sigma = objects.center_covariances[row], objects.log_semi_axes_sigmas[row]
         if not np.isfinite(center).all():
             center = UNKNOWN_CENTER_SIGMA_M**2 * np.eye(3)
         if not np.isfinite(sigma).all():
             sigma = np.full(3, UNKNOWN_LOG_SIGMA)
         covariance[:3, :3] = center
         covariance[3:, 3:] = _shape_covariance(
-            objects.semi_axes[row], objects.orientation_xyzw[row], sigma
+            objects.semi_axes[row], objects.orientations[row], sigma
         )
     return KnownMap(
         camera=_with_mount(results.camera, robot_from_camera),
-        object_ids=objects.id[rows].tolist(),
-        class_names=tuple(objects.class_name[row] for row in rows),
+        object_ids=objects.object_ids[rows].tolist(),
+        class_names=tuple(objects.class_names[row] for row in rows),
         ellipsoids=objects.ellipsoids[rows],
         covariances=covariances,
     )

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dqslam import _core
-from dqslam._checks import Floats, Ints
+from dqslam._checks import Floats, Ints, require
+from dqslam._repr import counted
 from dqslam.association import FINAL, UNSURE
 from dqslam.assumptions import BoxNoise, OdometryNoise, SizePrior, SizePriors
 from dqslam.estimate import Estimate
@@ -26,6 +27,7 @@ from dqslam.online.relocalize import Relocation, relocalize
 from dqslam.online.state import Settings, State
 from dqslam.online.step import Motion, StepBoxes, StepPositions
 from dqslam.online.stepping import take_step
+from dqslam.recording import pose_model_of, pose_size
 
 
 class OnlineSlam:
@@ -43,7 +45,8 @@ class OnlineSlam:
     online
         Of the steps: how many poses are minimized, and when.
     pose_model
-        SE2 or SE3.
+        SE2 or SE3; by default that of ``first_pose``, and without one that of the first motion:
+        until then the plane is assumed.
     first_pose, first_covariance
         world_from_robot of the first step, the origin by default, and its covariance (k, k), by
         default none: it is exact.
@@ -58,6 +61,18 @@ class OnlineSlam:
     estimates_noise
         Whether the level of the odometry's noise is estimated from such boxes, and the covariances
         of the steps are not believed.
+
+    Examples
+    --------
+    >>> import dqslam as dq
+    >>> recording, truth = dq.simulate(dq.load_scenario("paper"), seed=7)
+    >>> slam = dq.OnlineSlam(recording.camera)
+    >>> for step in dq.steps_of(recording):
+    ...     report = slam.add(step.odometry, step.boxes, timestamp=step.timestamp)
+    >>> slam
+    OnlineSlam(SE2, 253 steps, 10 objects)
+    >>> slam.polish().result().summary.converged
+    True
     """
 
     def __init__(
@@ -66,7 +81,7 @@ class OnlineSlam:
         options: _core.SolveOptions | None = None,
         *,
         online: _core.OnlineOptions | None = None,
-        pose_model: _core.PoseModel = _core.PoseModel.SE2,
+        pose_model: _core.PoseModel | None = None,
         first_pose: ArrayLike | None = None,
         first_covariance: ArrayLike | None = None,
         box_noise: BoxNoise | None = None,
@@ -77,8 +92,14 @@ class OnlineSlam:
         estimates_noise: bool = False,
     ) -> None:
         """Begin a session without a step."""
+        self._arguments = {name: value for name, value in locals().items() if name != "self"}
+        require(camera, _core.Camera, "OnlineSlam", "OnlineSlam(recording.camera)")
         if not 0.5 < trust_ids <= FINAL:
             raise ValueError(f"trust in ids is {trust_ids:g}, not above 0.5 and at most 1")
+        self._may_leave_plane = pose_model is None and first_pose is None
+        if pose_model is None:
+            given = np.zeros(3) if first_pose is None else first_pose
+            pose_model = pose_model_of("first_pose", given)
         self.camera = camera
         self.pose_model = pose_model
         self.solve_options = _core.SolveOptions() if options is None else options
@@ -137,10 +158,32 @@ class OnlineSlam:
             For a time that does not increase, a step without odometry, numbers that are not finite
             and boxes that are none. Nothing has changed then.
         """
+        for given, kind in ((odometry, Motion), (boxes, StepBoxes), (positions, StepPositions)):
+            if given is not None:
+                hint = "slam.add(step.odometry, step.boxes, timestamp=step.timestamp)"
+                require(given, kind, "OnlineSlam.add", hint)
+        if not len(self):
+            self._first_step = (boxes, timestamp, positions)
+        elif self._may_leave_plane and odometry is not None:
+            self._settle_pose_model(odometry)
         self._polisher.take()
         return take_step(self._state, self._identifier, odometry, boxes, timestamp, positions)
 
+    def _settle_pose_model(self, odometry: Motion) -> None:
+        """Begin again in space if that is where the first motion is."""
+        self._may_leave_plane = False
+        if np.shape(odometry.relative) == (pose_size(_core.PoseModel.SE3),):
+            space = OnlineSlam(**self._arguments | {"pose_model": _core.PoseModel.SE3})
+            boxes, timestamp, positions = self._first_step
+            space.add(None, boxes, timestamp=timestamp, positions=positions)
+            vars(self).update(vars(space))
+
     # ------------------------------------------------------------------------------ estimate
+
+    def __repr__(self) -> str:
+        """Show the pose model, and how many steps and objects there are."""
+        steps, objects = counted(len(self), "step"), counted(self.num_objects, "object")
+        return f"OnlineSlam({self.pose_model.name}, {steps}, {objects})"
 
     def __len__(self) -> int:
         """Return the number of steps."""
@@ -271,6 +314,7 @@ class OnlineSlam:
         known = load_map(directory, robot_from_camera)
         slam = cls(known.camera, options, **settings)
         add_map(slam._state, known)
+        slam._may_leave_plane = False
         if first_boxes is not None:
             if settings.get("first_pose") is None:
                 found = slam.relocalize(first_boxes)

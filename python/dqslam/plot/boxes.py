@@ -36,7 +36,7 @@ def draw_worst_and_median(results: Results, fits: BoxFits) -> "Figure":
     chosen = list(dict.fromkeys([0, len(poses) // 2]))
     names = ("worst", "median")
     camera = results.camera
-    styles = class_styles(results.objects.class_name)
+    styles = class_styles(results.objects.class_names)
     height = min(COLUMN_INCHES * camera.height / camera.width, _TALLEST)
     with column_style():
         figure = new_figure(COLUMN_INCHES, (height + 0.22) * len(chosen) + 0.25)
@@ -77,7 +77,7 @@ def _draw(
     for row, outline in zip(rows, outlines, strict=True):
         if row not in detected:
             continue
-        color = styles[results.objects.class_name[row]]["color"]
+        color = styles[results.objects.class_names[row]]["color"]
         axes.plot(*outline.T, color=color, linewidth=0.5, gid="outline")
         box = np.concatenate([outline.min(axis=0), outline.max(axis=0)])
         axes.plot(
@@ -94,8 +94,8 @@ def _name(
     place_labels(
         axes,
         [rectangle(fits.boxes.box[row]) for row in rows],
-        [f"{objects.class_name[row]} {objects.id[row]}" for row in seen],
-        [styles[objects.class_name[row]]["color"] for row in seen],
+        [f"{objects.class_names[row]} {objects.object_ids[row]}" for row in seen],
+        [styles[objects.class_names[row]]["color"] for row in seen],
         size=5.5,
     )
 

@@ -39,7 +39,7 @@ def draw_boxes(
         boxes = boxes_through_lens(results.camera, boxes)
     for row, box in zip(rows, boxes, strict=True):
         seen = fits.object_row[row]
-        color = unmapped if seen < 0 else styles[results.objects.class_name[seen]]["color"]
+        color = unmapped if seen < 0 else styles[results.objects.class_names[seen]]["color"]
         held_out = bool(fits.boxes.held_out[row])
         axes.plot(
             *rectangle(box),
@@ -57,12 +57,12 @@ def visible_outlines(results: Results, pose: int, *, lens: bool) -> tuple[Ints, 
     Shapes (v,) and (v, n, 2). Whether anything hides them is not known.
     """
     camera, objects = results.camera, results.objects
-    here = np.repeat(results.world_from_camera[[pose]], len(objects), axis=0)
+    here = np.repeat(results.poses[[pose]], len(objects), axis=0)
     outlines = project_outlines(camera, here, objects.ellipsoids)
     if lens:
         outlines = through_lens(camera, outlines)
     shown = np.flatnonzero(_in_image(outlines, np.array([camera.width, camera.height])))
-    distance = np.linalg.norm(objects.center[shown] - here[shown, :3], axis=1)
+    distance = np.linalg.norm(objects.centers[shown] - here[shown, :3], axis=1)
     order = np.argsort(-distance, kind="stable")
     return shown[order], outlines[shown[order]]
 

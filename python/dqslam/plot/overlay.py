@@ -36,7 +36,7 @@ class Overlay:
         self._results = results
         self.timestamps = results.timestamps
         self._fits = None if results.boxes is None else fit_boxes(results)
-        self._styles = class_styles(results.objects.class_name)
+        self._styles = class_styles(results.objects.class_names)
         camera = results.camera
         self._scale = max(camera.height / 480.0, 0.5)  # lines and names grow with the image
         self.figure = new_figure(camera.width / _DPI, camera.height / _DPI)
@@ -82,7 +82,7 @@ class Overlay:
         from matplotlib.patheffects import withStroke
 
         objects, scale = self._results.objects, self._scale
-        color = self._styles[objects.class_name[row]]["color"]
+        color = self._styles[objects.class_names[row]]["color"]
         dark = [withStroke(linewidth=2.6 * scale, foreground="black", alpha=0.5)]
         axes.plot(
             *outline.T,
@@ -93,7 +93,9 @@ class Overlay:
             gid="outline",
         )
         if is_detected:
-            self._write_name(axes, f"{objects.class_name[row]} {objects.id[row]}", outline, color)
+            self._write_name(
+                axes, f"{objects.class_names[row]} {objects.object_ids[row]}", outline, color
+            )
 
     def _write_name(self, axes: "Axes", name: str, outline: Floats, color: str) -> None:
         """Write a name above an outline, or as near to that as the image goes."""

@@ -102,5 +102,5 @@ def _map_truth(
 ) -> MapTruth:
     rows, true_rows = common_poses(results.timestamps, groundtruth, max_time_difference)
     true_poses = groundtruth.world_from_camera[true_rows]
-    alignment, _ = object_alignment(results, results.world_from_camera[rows], true_poses, align)
+    alignment, _ = object_alignment(results, results.poses[rows], true_poses, align)
     return MapTruth(groundtruth.timestamps[true_rows], true_poses, objects, alignment)

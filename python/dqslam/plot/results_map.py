@@ -60,10 +60,10 @@ def draw_results_map(results: Results, truth: MapTruth | None = None) -> "Figure
     """
     move = Alignment(np.eye(3), np.zeros(3)) if truth is None else truth.alignment
     estimate, odometry = (
-        move.apply_poses(poses) for poses in (results.world_from_camera, results.odometry)
+        move.apply_poses(poses) for poses in (results.poses, results.initial_poses)
     )
     view = from_above(estimate if truth is None else truth.world_from_camera)
-    styles = class_styles(results.objects.class_name)
+    styles = class_styles(results.objects.class_names)
     true_outlines = [] if truth is None else _true_outlines(view, truth.objects)
     outlines = _outlines(view, results.objects, move)
     paths = [view.points(estimate[:, :3])]
@@ -94,7 +94,7 @@ def draw_results_map(results: Results, truth: MapTruth | None = None) -> "Figure
             axes,
             outlines,
             _names(results.objects),
-            [styles[name]["color"] for name in results.objects.class_name],
+            [styles[name]["color"] for name in results.objects.class_names],
             size=6.0 if len(outlines) <= _NAMED_BY_CLASS else 5.0,
         )
     return figure
@@ -125,11 +125,11 @@ def _true_path(view: FromAbove, truth: MapTruth) -> Floats:
 
 def _outlines(view: FromAbove, objects: MapObjects, move: Alignment) -> list[Floats]:
     """Return the outline of each object (2, n); a point where it is no ellipsoid."""
-    centers = move.apply(objects.center)
+    centers = move.apply(objects.centers)
     found = []
     for row, center in enumerate(centers):
         if objects.is_ellipsoid[row]:
-            axes = _turns(objects.orientation_xyzw[row]) * (move.scale * objects.semi_axes[row])
+            axes = _turns(objects.orientations[row]) * (move.scale * objects.semi_axes[row])
             axes = move.rotation @ axes
             found.append(view.outline(center, axes @ axes.T))
         else:
@@ -159,13 +159,13 @@ def _turns(xyzw: Floats) -> Floats:
 def _draw_pose_ellipses(
     axes: "Axes", view: FromAbove, results: Results, estimate: Floats, scale: float
 ) -> None:
-    known = np.flatnonzero(np.isfinite(results.covariance).all(axis=(1, 2)))
+    known = np.flatnonzero(np.isfinite(results.covariances).all(axis=(1, 2)))
     if not known.size:
         return
     evenly = np.unique(np.linspace(0, len(known) - 1, _POSE_ELLIPSES + 1).astype(int)[1:])
     for row in known[evenly]:
         turn = _turns(estimate[row, 3:])
-        spread = (_SIGMAS * scale) ** 2 * turn @ results.covariance[row, :3, :3] @ turn.T
+        spread = (_SIGMAS * scale) ** 2 * turn @ results.covariances[row, :3, :3] @ turn.T
         axes.plot(
             *view.outline(estimate[row, :3], spread),
             color=ESTIMATE,
@@ -184,16 +184,16 @@ def _draw_objects(
     styles: dict[str, dict[str, Any]],
 ) -> None:
     for row, one in enumerate(outlines):
-        style = styles[objects.class_name[row]]
+        style = styles[objects.class_names[row]]
         if one.shape[1] == 1:
             axes.plot(*one, "x", color=style["color"], markersize=4, gid="object")
             continue
         axes.fill(*one, facecolor=style["color"], alpha=0.25, linewidth=0, zorder=2.5)
         axes.plot(*one, linewidth=0.9, zorder=2.6, gid="object", **style)
-        covariance = objects.center_covariance[row]
+        covariance = objects.center_covariances[row]
         if np.isfinite(covariance).all():
             turned = _SIGMAS**2 * move.scale**2 * move.rotation @ covariance @ move.rotation.T
-            (center,) = move.apply(objects.center[[row]])
+            (center,) = move.apply(objects.centers[[row]])
             flat = view.axes @ turned @ view.axes.T
             axes.plot(
                 *outline(view.axes @ center, flat),
@@ -221,8 +221,8 @@ def _draw_legend(
     if truth is not None:
         handles.append(Line2D([], [], **_TRUE_PATH))
     spread = (
-        np.isfinite(results.covariance).any()
-        or np.isfinite(results.objects.center_covariance).any()
+        np.isfinite(results.covariances).any()
+        or np.isfinite(results.objects.center_covariances).any()
     )
     if spread:
         dots = Line2D([], [], color="0.2", linewidth=0.6, linestyle=":", label="2σ")
@@ -253,7 +253,7 @@ def _draw_legend(
 def _names(objects: MapObjects) -> list[str]:
     """Return what is written beside each object: its class, and its id where that is not enough."""
     if len(objects) > _NAMED_BY_CLASS:
-        return [str(number) for number in objects.id]
-    count = Counter(objects.class_name)
-    pairs = zip(objects.class_name, objects.id, strict=True)
+        return [str(number) for number in objects.object_ids]
+    count = Counter(objects.class_names)
+    pairs = zip(objects.class_names, objects.object_ids, strict=True)
     return [name if count[name] == 1 else f"{name} {number}" for name, number in pairs]

@@ -210,6 +210,13 @@ def load_scenario(source: str | Path) -> Scenario:
         When there is no such file; lists the names that come with dqslam.
     FileError
         When the file is no scenario; names the file, and the line of every wrong setting.
+
+    Examples
+    --------
+    >>> import dqslam as dq
+    >>> scenario = dq.load_scenario("paper")
+    >>> scenario.world.object_count, scenario.odometry.rotation_sigma_rad
+    (10, 0.02)
     """
     path = _find(source)
     file = read_toml(path)

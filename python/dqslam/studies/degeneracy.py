@@ -128,7 +128,8 @@ def observe(motion: CameraMotion, random: Generator) -> tuple[Graph, Floats]:
         Recording(
             camera=camera,
             timestamps=np.arange(len(motion.poses), dtype=np.float64),
-            odometry=_exact_odometry(motion.poses),
+            # Exact; that the poses are known makes the covariance idle.
+            odometry=Odometry.from_poses(motion.poses, covariance=np.eye(3)),
             detections=Detections(
                 pose=pose,
                 box=box,

@@ -16,7 +16,7 @@ Numbers = tuple[tuple[str, str], ...]
 
 def overview(results: Results, evaluation: Mapping[str, Any]) -> Numbers:
     """Describe the whole; ``evaluation`` is that of ``evaluate_results``, empty without truth."""
-    path = np.linalg.norm(np.diff(results.world_from_camera[:, :3], axis=0), axis=1).sum()
+    path = np.linalg.norm(np.diff(results.poses[:, :3], axis=0), axis=1).sum()
     shown = [
         ("poses", f"{len(results.timestamps)} over {path:.4g} m"),
         ("objects", f"{len(results.objects)} mapped, {len(results.objects.dropped)} not"),
@@ -44,22 +44,22 @@ def object_numbers(results: Results, evaluation: Mapping[str, Any]) -> list[Numb
     pairs = {pair["id"]: pair for pair in judged["pairs"]} if judged else {}
     described = []
     for row in range(len(objects)):
-        shown = [("center", f"{_vector(objects.center[row])} m")]
-        covariance = objects.center_covariance[row]
+        shown = [("center", f"{_vector(objects.centers[row])} m")]
+        covariance = objects.center_covariances[row]
         if np.isfinite(covariance).all():
             shown.append(("σ of center", _lengths(np.sqrt(np.diag(covariance)))))
         if objects.is_ellipsoid[row]:
             shown.append(("size", _lengths(2.0 * objects.semi_axes[row])))
-        if np.isfinite(objects.log_semi_axes_sigma[row]).all():
-            sigma = " × ".join(f"{100.0 * s:.2g} %" for s in objects.log_semi_axes_sigma[row])
+        if np.isfinite(objects.log_semi_axes_sigmas[row]).all():
+            sigma = " × ".join(f"{100.0 * s:.2g} %" for s in objects.log_semi_axes_sigmas[row])
             shown.append(("σ of size", sigma))
         if boxes is not None and overlap is not None:
-            mine = boxes.object_id == objects.id[row]
+            mine = boxes.object_id == objects.object_ids[row]
             shown.append(("boxes", f"{mine.sum()}, {(mine & boxes.inlier).sum()} fit"))
             known = overlap[mine & np.isfinite(overlap)]
             if len(known):
                 shown.append(("IoU of boxes", f"{np.median(known):.3f}"))
-        described.append((*shown, *_errors(pairs.get(int(objects.id[row])), bool(judged))))
+        described.append((*shown, *_errors(pairs.get(int(objects.object_ids[row])), bool(judged))))
     return described
 
 

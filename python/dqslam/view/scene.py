@@ -178,11 +178,11 @@ def build_scene(
             true_objects = _true_objects(objects, estimated_from_true, colors)
     return Scene(
         title="/".join(results.directory.resolve().parts[-2:]),
-        up=up_direction(results.world_from_camera),
+        up=up_direction(results.poses),
         camera=results.camera,
         timestamps=results.timestamps,
-        estimate=results.world_from_camera,
-        odometry=results.odometry,
+        estimate=results.poses,
+        odometry=results.initial_poses,
         cameras=_some(np.arange(len(results.timestamps))),
         pose_spreads=_pose_spreads(results),
         truth=truth,
@@ -202,13 +202,13 @@ def _pose_spreads(results: Results) -> tuple[Spread, ...]:
     from scipy.spatial.transform import Rotation
 
     # In the frame of the camera; the first pose is exact, which is no ellipsoid.
-    covariance = results.covariance[:, :3, :3]
+    covariance = results.covariances[:, :3, :3]
     known = np.isfinite(covariance).all(axis=(1, 2)) & (covariance != 0.0).any(axis=(1, 2))
     spreads = []
     for row in _some(np.flatnonzero(known)):
-        turn = Rotation.from_quat(results.world_from_camera[row, 3:]).as_matrix()
+        turn = Rotation.from_quat(results.poses[row, 3:]).as_matrix()
         in_world = turn @ covariance[row] @ turn.T
-        spreads.append(spread_of(results.world_from_camera[row, :3], in_world))
+        spreads.append(spread_of(results.poses[row, :3], in_world))
     return tuple(spreads)
 
 
@@ -228,7 +228,7 @@ def _inverse(true_from_estimated: Mapping[str, Any]) -> Alignment:
 
 def _class_colors(mapped: MapObjects, true: TrueObjects | None) -> dict[str, str]:
     """Return the color of each class, those of the map first; more classes than colors share."""
-    names = sorted(set(mapped.class_name))
+    names = sorted(set(mapped.class_names))
     names += sorted(set(true.class_name or () if true else ()) - set(names))
     return {name: CLASSES[k % len(CLASSES)] for k, name in enumerate(names)}
 
@@ -238,18 +238,18 @@ def _mapped_objects(
 ) -> tuple[SceneObject, ...]:
     mapped = results.objects
     numbers = object_numbers(results, evaluation)
-    of_object = [colors[name] for name in mapped.class_name]
-    if len(set(mapped.class_name)) == 1:
+    of_object = [colors[name] for name in mapped.class_names]
+    if len(set(mapped.class_names)) == 1:
         of_object = [CLASSES[row % len(CLASSES)] for row in range(len(mapped))]
     return tuple(
         SceneObject(
-            id=int(mapped.id[row]),
-            class_name=mapped.class_name[row],
+            id=int(mapped.object_ids[row]),
+            class_name=mapped.class_names[row],
             color=of_object[row],
-            center=mapped.center[row],
+            center=mapped.centers[row],
             semi_axes=_known(mapped.semi_axes[row]),
-            orientation_xyzw=_known(mapped.orientation_xyzw[row]),
-            center_covariance=_known(mapped.center_covariance[row]),
+            orientation_xyzw=_known(mapped.orientations[row]),
+            center_covariance=_known(mapped.center_covariances[row]),
             numbers=numbers[row],
         )
         for row in range(len(mapped))
@@ -293,7 +293,7 @@ def _boxes(boxes: BoxTable | None, mapped: MapObjects) -> SceneBoxes:
     if boxes is None:
         none = np.zeros(0, dtype=np.int64)
         return SceneBoxes(none, np.zeros((0, 4)), none, (), ())
-    row_of = {int(number): row for row, number in enumerate(mapped.id)}
+    row_of = {int(number): row for row, number in enumerate(mapped.object_ids)}
     order = np.argsort(boxes.pose, kind="stable")
     mapped_row = np.array([row_of.get(int(boxes.object_id[row]), -1) for row in order], dtype=int)
     states = []

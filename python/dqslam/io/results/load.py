@@ -12,6 +12,7 @@ import numpy as np
 
 from dqslam import _core
 from dqslam._checks import Bools, Floats, Ints, as_floats, as_ints
+from dqslam._repr import counted
 from dqslam.io.camera import read_camera
 from dqslam.io.files import FileError, read_text
 from dqslam.io.results.boxes import BoxTable, read_boxes
@@ -23,28 +24,35 @@ from dqslam.io.trajectory import read_trajectory
 class MapObjects:
     """The objects of ``map.json``, rows in its order."""
 
-    id: Ints
+    object_ids: Ints
     """Shape (o,)."""
-    class_name: tuple[str, ...]
+    class_names: tuple[str, ...]
     """One per object."""
-    center: Floats
+    centers: Floats
     """In the world, meters, shape (o, 3)."""
     semi_axes: Floats
     """Descending, meters, shape (o, 3); NaN where the object is no ellipsoid."""
-    orientation_xyzw: Floats
-    """world_from_object, shape (o, 4); NaN where it is no ellipsoid."""
+    orientations: Floats
+    """world_from_object, x y z w, shape (o, 4); NaN where it is no ellipsoid."""
+    dual_quadrics: Floats
+    """q1 .. q9 with Q*(4,4) = 1, shape (o, 9); NaN where the file has none."""
     observations: Ints
     """Boxes that were used, shape (o,)."""
-    center_covariance: Floats
+    center_covariances: Floats
     """Square meters, shape (o, 3, 3); NaN where unknown."""
-    log_semi_axes_sigma: Floats
+    log_semi_axes_sigmas: Floats
     """Of the natural logarithms of the semi-axes, shape (o, 3); NaN where unknown."""
     dropped: Mapping[int, str] = field(default_factory=dict)
     """Ids of objects that were not mapped, and why."""
 
     def __len__(self) -> int:
         """Return the number of objects."""
-        return len(self.id)
+        return len(self.object_ids)
+
+    def __repr__(self) -> str:
+        """Show how many objects there are."""
+        dropped = f", {len(self.dropped)} dropped" if self.dropped else ""
+        return f"MapObjects({counted(len(self), 'object')}{dropped})"
 
     @property
     def is_ellipsoid(self) -> Bools:
@@ -56,8 +64,8 @@ class MapObjects:
         """Center and log-Cholesky shape, shape (o, 9); NaN where it is no ellipsoid."""
         rows = np.full((len(self), 9), np.nan)
         for row in np.flatnonzero(self.is_ellipsoid):
-            axes, turn = self.semi_axes[row], self.orientation_xyzw[row]
-            rows[row] = _core.ellipsoid_from_axes(self.center[row], axes, turn)
+            axes, turn = self.semi_axes[row], self.orientations[row]
+            rows[row] = _core.ellipsoid_from_axes(self.centers[row], axes, turn)
         return rows
 
 
@@ -70,11 +78,11 @@ class Results:
     """Without the mount on the robot: the poses are the camera's."""
     timestamps: Floats
     """Seconds, shape (n,)."""
-    world_from_camera: Floats
-    """Estimated, shape (n, 7)."""
-    odometry: Floats
-    """world_from_camera that the estimate started from, shape (n, 7)."""
-    covariance: Floats
+    poses: Floats
+    """world_from_camera, shape (n, 7)."""
+    initial_poses: Floats
+    """world_from_camera by odometry alone, shape (n, 7)."""
+    covariances: Floats
     """Of the poses in the frame of the camera, x y z [m] and rotation vector [rad], the first pose
     being exact; shape (n, 6, 6), NaN where unknown."""
     objects: MapObjects
@@ -83,11 +91,28 @@ class Results:
     report: Mapping[str, Any]
     """``report.json``, empty without it."""
 
+    def __repr__(self) -> str:
+        """Show where the files are, and how many poses and objects are in them."""
+        poses, objects = counted(len(self.poses), "pose"), counted(len(self.objects), "object")
+        return f"Results({str(self.directory)!r}, {poses}, {objects})"
+
 
 def load_results(directory: str | Path) -> Results:
     """Read a directory of results; FileError names what is missing or wrong, and its line.
 
     ``covariance.csv``, ``boxes.csv`` and ``report.json`` may be absent.
+
+    Examples
+    --------
+    Names are those of an estimate, those of objects under ``objects``; poses are the camera's:
+
+    >>> import dqslam as dq
+    >>> recording, truth = dq.simulate(dq.load_scenario("paper"), seed=7)
+    >>> estimate, summary = dq.solve(dq.build_graph(recording))
+    >>> dq.save_estimate(estimate, "results/seed7")
+    >>> results = dq.load_results("results/seed7")
+    >>> results.poses.shape, results.objects.centers.shape
+    ((253, 7), (10, 3))
     """
     directory = Path(directory)
     if not directory.is_dir():
@@ -103,9 +128,9 @@ def load_results(directory: str | Path) -> Results:
         directory=directory,
         camera=read_camera(directory / "camera.json"),
         timestamps=times,
-        world_from_camera=poses,
-        odometry=odometry,
-        covariance=read_covariances(covariance, times)
+        poses=poses,
+        initial_poses=odometry,
+        covariances=read_covariances(covariance, times)
         if covariance.exists()
         else np.full((len(times), 6, 6), np.nan),
         objects=_read_map(directory / "map.json"),
@@ -138,14 +163,15 @@ def _read_map(path: Path) -> MapObjects:
             raise FileError(path, f"objects row {row}: missing {', '.join(missing)}")
     try:
         found = MapObjects(
-            id=as_ints("objects id", _column(objects, "id")),
-            class_name=tuple(str(entry["class_name"]) for entry in objects),
-            center=as_floats("objects center", _column(objects, "center"), [None, 3]),
+            object_ids=as_ints("objects id", _column(objects, "id")),
+            class_names=tuple(str(entry["class_name"]) for entry in objects),
+            centers=as_floats("objects center", _column(objects, "center"), [None, 3]),
             semi_axes=_maybe(objects, "semi_axes", (3,)),
-            orientation_xyzw=_maybe(objects, "orientation_xyzw", (4,)),
+            orientations=_maybe(objects, "orientation_xyzw", (4,)),
+            dual_quadrics=_maybe(objects, "dual_quadric", (4, 4))[:, *np.triu_indices(4)][:, :9],
             observations=as_ints("objects observations", _column(objects, "observations")),
-            center_covariance=_maybe(objects, "center_covariance", (3, 3)),
-            log_semi_axes_sigma=_maybe(objects, "log_semi_axes_sigma", (3,)),
+            center_covariances=_maybe(objects, "center_covariance", (3, 3)),
+            log_semi_axes_sigmas=_maybe(objects, "log_semi_axes_sigma", (3,)),
             dropped={int(one["id"]): str(one["reason"]) for one in content.get("dropped", [])},
         )
     except (ValueError, TypeError, KeyError) as error:
@@ -155,10 +181,10 @@ def _read_map(path: Path) -> MapObjects:
 
 
 def _check(path: Path, found: MapObjects) -> None:
-    ids, counts = np.unique(found.id, return_counts=True)
+    ids, counts = np.unique(found.object_ids, return_counts=True)
     if (counts > 1).any():
         raise FileError(path, f"id {ids[counts > 1][0]} occurs twice")
-    norm = np.linalg.norm(found.orientation_xyzw, axis=1)
+    norm = np.linalg.norm(found.orientations, axis=1)
     wrong = (found.semi_axes <= 0.0).any(axis=1) | (np.abs(norm - 1.0) > 1e-6)
     wrong |= np.isfinite(norm) != found.is_ellipsoid
     if wrong.any():

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from dqslam import _core
-from dqslam._checks import Bools, Floats
+from dqslam._checks import Bools, Floats, require
 from dqslam.estimate import Estimate
 from dqslam.io.files import write_json
 from dqslam.io.results.boxes import write_boxes
@@ -53,7 +53,19 @@ def save_estimate(
     marginals
         Covariances of the mapped objects, for the ellipsoid model, and of the poses, for
         ``covariance.csv``.
+
+    Examples
+    --------
+    >>> import dqslam as dq
+    >>> recording, truth = dq.simulate(dq.load_scenario("paper"), seed=7)
+    >>> graph = dq.build_graph(recording)
+    >>> estimate, summary = dq.solve(graph)
+    >>> marginals = dq.marginal_covariances(graph, estimate)
+    >>> dq.save_estimate(estimate, "results/seed7", marginals=marginals)
+    >>> dq.load_results("results/seed7")
+    Results('results/seed7', 253 poses, 10 objects)
     """
+    require(estimate, Estimate, "save_estimate", "save_estimate(estimate, directory)")
     directory = Path(directory)
     paths = {"trajectory.txt": estimate.poses, "odometry.txt": estimate.initial_poses}
     for name, poses in paths.items():

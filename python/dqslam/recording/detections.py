@@ -1,0 +1,220 @@
+"""Boxes that a detector drew."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dqslam._checks import Bools, Floats, Ints, as_floats, as_ints, assign, reject_rows
+from dqslam._core import Camera
+from dqslam._repr import counted
+from dqslam.recording.detectors import DetectedBoxes, read_supervision, read_ultralytics
+
+# Detectors count pixels from the corner of the image, we from the center of the first one.
+_CORNER = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Detections:
+    """Boxes that a detector drew, one row each."""
+
+    pose: Ints
+    """Row of the pose it was seen from, shape (m,)."""
+    box: Floats
+    """[u_min, v_min, u_max, v_max] in undistorted pixels, shape (m, 4)."""
+    score: Floats
+    """Confidence of the detector, shape (m,)."""
+    class_id: Ints
+    """Shape (m,)."""
+    object_id: Ints
+    """Which object it shows, -1 when unknown; shape (m,)."""
+    class_names: dict[int, str] = field(default_factory=dict)
+    """Name of every class id that occurs."""
+    truncated: Bools = field(default_factory=lambda: np.zeros((0, 4), dtype=np.bool_))
+    """Which edges are the border of the image, which the object leaves; shape (m, 4), none by
+    default."""
+
+    def __post_init__(self) -> None:
+        """Check shapes and numbers."""
+        box = as_floats("detections.box", self.box, [None, 4])
+        reject_rows("detections.box", box[:, :2] >= box[:, 2:], "inverted or empty box", box)
+        count = len(box)
+        class_id = as_ints("detections.class_id", self.class_id, count)
+        unnamed = ~np.isin(class_id, list(self.class_names))
+        reject_rows("detections.class_id", unnamed, "class has no name", class_id)
+        object_id = as_ints("detections.object_id", self.object_id, count)
+        reject_rows("detections.object_id", object_id < -1, "not an object id", object_id)
+        assign(
+            self,
+            pose=as_ints("detections.pose", self.pose, count),
+            box=box,
+            score=as_floats("detections.score", self.score, [count]),
+            class_id=class_id,
+            object_id=object_id,
+            truncated=_as_edges("detections.truncated", self.truncated, count),
+        )
+
+    @classmethod
+    def from_xyxy(
+        cls,
+        pose: ArrayLike,
+        xyxy: ArrayLike,
+        *,
+        object_id: ArrayLike | None = None,
+        class_id: ArrayLike | None = None,
+        class_names: Mapping[int, str] | Sequence[str] | None = None,
+        score: ArrayLike | None = None,
+        camera: Camera | None = None,
+    ) -> Self:
+        """Take corners as detectors give them, in pixels from the corner of the image.
+
+        There, an image spans 0 to its width; in ``box`` it spans -0.5 to width - 0.5.
+
+        Parameters
+        ----------
+        pose
+            Row of the pose that each box was seen from, shape (m,), or one number for all.
+        xyxy
+            [x_min, y_min, x_max, y_max], shape (m, 4).
+        object_id
+            Which object each box shows, shape (m,); by default unknown, as ``associate`` finds out.
+        class_id, class_names
+            Shape (m,), and the name of each number. Without names, a class is called by its number;
+            without both, all boxes are of the class "object".
+        score
+            Shape (m,), by default 1.
+        camera
+            One with distortion: the boxes were drawn in its images and become undistorted.
+
+        Examples
+        --------
+        Two boxes in the image that was taken at pose 0, one at pose 1:
+
+        >>> import dqslam as dq
+        >>> xyxy = [[100, 80, 181, 190], [300, 120, 420, 260], [103, 80, 184, 191]]
+        >>> names = ["cup", "book"]
+        >>> dq.Detections.from_xyxy([0, 0, 1], xyxy, class_id=[0, 1, 0], class_names=names)
+        Detections(3 boxes without ids, 2 classes)
+        """
+        box = as_floats("xyxy", xyxy, [None, 4]) - _CORNER
+        count = len(box)
+        numbers = np.zeros(count, dtype=np.int64)
+        if class_id is not None:
+            numbers = as_ints("class_id", _each(class_id, count), count)
+        if class_names is None:
+            unnamed = class_id is None
+            names = {i: "object" if unnamed else str(i) for i in np.unique(numbers).tolist()}
+        elif isinstance(class_names, Mapping):
+            names = dict(class_names)
+        else:
+            names = dict(enumerate(class_names))
+        return cls(
+            pose=as_ints("pose", _each(pose, count), count),
+            box=box if camera is None else camera.undistort_boxes(box),
+            score=as_floats("score", _each(1.0 if score is None else score, count), [count]),
+            class_id=numbers,
+            object_id=as_ints(
+                "object_id", _each(-1 if object_id is None else object_id, count), count
+            ),
+            class_names=names,
+        )
+
+    @classmethod
+    def from_supervision(
+        cls,
+        images: Iterable[Any],
+        *,
+        pose: ArrayLike | None = None,
+        camera: Camera | None = None,
+    ) -> Self:
+        """Take what the library supervision has of each image: a list of ``sv.Detections``.
+
+        Confidence, class and the ids of a tracker are used where they are there.
+
+        Parameters
+        ----------
+        images
+            One ``supervision.Detections`` per image, empty ones too.
+        pose
+            Row of the pose at which each image was taken; by default the first image belongs to
+            the first pose, and so on.
+        camera
+            One with distortion: the boxes were drawn in its images and become undistorted.
+        """
+        return cls._from_detector(read_supervision(images), pose, camera)
+
+    @classmethod
+    def from_ultralytics(
+        cls,
+        images: Iterable[Any],
+        *,
+        pose: ArrayLike | None = None,
+        camera: Camera | None = None,
+    ) -> Self:
+        """Take what Ultralytics' ``predict`` or ``track`` returns: one ``Results`` per image.
+
+        The ids of ``track`` are used where they are there; parameters are those of
+        ``from_supervision``.
+        """
+        return cls._from_detector(read_ultralytics(images), pose, camera)
+
+    @classmethod
+    def _from_detector(
+        cls, found: DetectedBoxes, pose: ArrayLike | None, camera: Camera | None
+    ) -> Self:
+        rows = np.arange(found.images) if pose is None else as_ints("pose", pose, found.images)
+        return cls.from_xyxy(
+            rows[found.image],
+            found.xyxy,
+            object_id=found.object_id,
+            class_id=found.class_id,
+            class_names=found.class_names,
+            score=found.score,
+            camera=camera,
+        )
+
+    def __len__(self) -> int:
+        """Return the number of boxes."""
+        return len(self.box)
+
+    def __repr__(self) -> str:
+        """Show how many boxes, objects and classes there are."""
+        return f"Detections({in_words(self)})"
+
+    def select(self, rows: Ints | Bools) -> Self:
+        """Return some of the boxes: their rows, or a flag for each box (m,)."""
+        names = ("pose", "box", "score", "class_id", "object_id", "truncated")
+        return replace(self, **{name: getattr(self, name)[rows] for name in names})
+
+
+def in_words(boxes: Detections) -> str:
+    """Say how many boxes there are, of how many objects and classes."""
+    count, known = counted(len(boxes), "box"), boxes.object_id >= 0
+    if not len(boxes):
+        return count
+    classes = counted(len(np.unique(boxes.class_id)), "class")
+    if not known.any():
+        return f"{count} without ids, {classes}"
+    objects = counted(len(np.unique(boxes.object_id[known])), "object")
+    unknown = "" if known.all() else f", {np.sum(~known)} without id"
+    return f"{count} of {objects}{unknown}, {classes}"
+
+
+def _each(values: ArrayLike, count: int) -> ArrayLike:
+    """Repeat a single number for each of the rows."""
+    return np.full(count, values) if np.ndim(values) == 0 else values
+
+
+def _as_edges(name: str, values: ArrayLike, count: int) -> Bools:
+    """Return read-only flags of the four edges of each box, shape (count, 4); none by default."""
+    flags = np.array(values)
+    if not flags.size:
+        flags = np.zeros((count, 4), dtype=np.bool_)
+    if flags.shape != (count, 4):
+        raise ValueError(f"{name}: expected shape ({count}, 4), got {flags.shape}")
+    reject_rows(name, ~np.isin(flags, [0, 1]), "not true or false", flags)
+    edges = flags.astype(np.bool_)
+    edges.setflags(write=False)
+    return edges

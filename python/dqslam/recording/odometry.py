@@ -1,0 +1,79 @@
+"""How a robot moved from pose to pose, as it measured it."""
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dqslam import _core
+from dqslam._checks import Floats, as_covariances, as_floats, assign
+from dqslam._repr import counted
+from dqslam.recording.poses import as_poses, pose_model_of, tangent_size
+
+
+@dataclass(frozen=True, eq=False)
+class Odometry:
+    """Relative motions between successive poses."""
+
+    pose_model: _core.PoseModel
+    first_pose: Floats
+    """world_from_robot of pose 0, shape (d,)."""
+    relative: Floats
+    """next_in_previous, shape (n - 1, d)."""
+    covariance: Floats
+    """In the tangent at `relative`, translation [m] first, then rotation [rad],
+    both in the frame of the next pose; shape (n - 1, k, k)."""
+
+    def __post_init__(self) -> None:
+        """Check shapes and numbers."""
+        model = self.pose_model
+        first_pose = as_poses("odometry.first_pose", np.atleast_2d(self.first_pose), model)
+        if len(first_pose) != 1:
+            raise ValueError(f"odometry.first_pose: expected one pose, got {len(first_pose)}")
+        relative = as_poses("odometry.relative", self.relative, model)
+        covariance = as_covariances(
+            "odometry.covariance", self.covariance, len(relative), tangent_size(model)
+        )
+        assign(self, first_pose=first_pose[0], relative=relative, covariance=covariance)
+
+    @classmethod
+    def from_poses(cls, poses: ArrayLike, *, covariance: ArrayLike) -> Self:
+        """Take the steps between poses that odometry has summed up.
+
+        Parameters
+        ----------
+        poses
+            world_from_robot, shape (n, 3) for [x, y, theta] or (n, 7) for [tx, ty, tz, qx, qy, qz,
+            qw]; their width tells the model.
+        covariance
+            Of every step alike, shape (k, k), or of each, shape (n - 1, k, k).
+
+        Examples
+        --------
+        A robot drives two meters, then one more while it turns left. Each step errs by 2 cm along
+        each axis and 0.01 rad:
+
+        >>> import dqslam as dq
+        >>> import numpy as np
+        >>> poses = [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [3.0, 0.0, 0.5]]
+        >>> odometry = dq.Odometry.from_poses(poses, covariance=np.diag([0.02, 0.02, 0.01]) ** 2)
+        >>> odometry
+        Odometry(SE2, 2 steps)
+        >>> odometry.relative.tolist()
+        [[2.0, 0.0, 0.0], [1.0, 0.0, 0.5]]
+        """
+        model = pose_model_of("poses", poses)
+        path = as_poses("poses", poses, model)
+        if not len(path):
+            raise ValueError("poses: there are none")
+        if np.ndim(covariance) == 2:
+            k = tangent_size(model)
+            one = as_floats("odometry.covariance", covariance, [k, k])
+            covariance = np.tile(one, (len(path) - 1, 1, 1))
+        relative = _core.between(model, path[:-1], path[1:])
+        return cls(model, path[0], relative, np.asarray(covariance))
+
+    def __repr__(self) -> str:
+        """Show the pose model and how many steps there are."""
+        return f"Odometry({self.pose_model.name}, {counted(len(self.relative), 'step')})"

@@ -1,0 +1,82 @@
+"""All that an estimator may see."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dqslam._checks import Floats, Ints, as_floats, assign, reject_rows
+from dqslam._core import Camera
+from dqslam._repr import counted
+from dqslam.recording.detections import Detections, in_words
+from dqslam.recording.measurements import Measurements
+from dqslam.recording.odometry import Odometry
+from dqslam.recording.positions import RelativePositions
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """All that an estimator may see.
+
+    Examples
+    --------
+    A robot with a camera that looks ahead passes a box, which a detector has drawn three times:
+
+    >>> import dqslam as dq
+    >>> import numpy as np
+    >>> ahead = [0.2, 0.0, 0.5, -0.5, 0.5, -0.5, 0.5]  # where the camera is on the robot
+    >>> camera = dq.Camera(500, 500, 319.5, 239.5, 640, 480, robot_from_camera=ahead)
+    >>> poses = [[0.0, 0.0, 0.0], [0.5, 0.0, 0.0], [1.0, 0.0, 0.0]]
+    >>> odometry = dq.Odometry.from_poses(poses, covariance=np.diag([0.02, 0.02, 0.01]) ** 2)
+    >>> xyxy = [[400, 200, 450, 260], [415, 195, 475, 268], [440, 188, 515, 278]]
+    >>> boxes = dq.Detections.from_xyxy([0, 1, 2], xyxy, object_id=0)
+    >>> dq.Recording(camera, [0.0, 0.5, 1.0], odometry, boxes)
+    Recording(SE2, 3 poses, 3 boxes of 1 object, 1 class)
+    """
+
+    camera: Camera
+    timestamps: Floats
+    """Strictly increasing seconds, shape (n,)."""
+    odometry: Odometry
+    detections: Detections
+    positions: RelativePositions | None = None
+    measurements: tuple[Measurements, ...] = ()
+    """Beside boxes and positions, one entry a kind."""
+
+    def __post_init__(self) -> None:
+        """Check that the parts belong together."""
+        timestamps = as_floats("timestamps", self.timestamps, [None])
+        stalls = np.concatenate([[False], np.diff(timestamps) <= 0.0])[: len(timestamps)]
+        reject_rows("timestamps", stalls, "time does not increase", timestamps)
+        count = len(self.odometry.relative) + 1
+        if len(timestamps) != count:
+            raise ValueError(
+                f"timestamps: expected {count}, one more than odometry.relative has rows, "
+                f"got {len(timestamps)}"
+            )
+        _check_poses("detections.pose", self.detections.pose, count)
+        if self.positions is not None:
+            _check_poses("positions.pose", self.positions.pose, count)
+        for measured in self.measurements:
+            _check_poses(f"{measured.kind}s.pose", measured.pose, count)
+        self._check_boxes_meet_image()
+        assign(self, timestamps=timestamps)
+
+    def _check_boxes_meet_image(self) -> None:
+        if self.camera.has_distortion:
+            return  # the image is no rectangle in undistorted pixels
+        box = self.detections.box
+        last = np.array([self.camera.width, self.camera.height]) - 0.5
+        outside = (box[:, 2:] <= -0.5) | (box[:, :2] >= last)
+        reject_rows("detections.box", outside, "box outside the image", box)
+
+    def __repr__(self) -> str:
+        """Show the pose model, and how many poses, boxes, objects and classes there are."""
+        parts = [self.odometry.pose_model.name, counted(len(self.timestamps), "pose")]
+        parts.append(in_words(self.detections))
+        if self.positions is not None:
+            parts.append(counted(len(self.positions), "position"))
+        return f"Recording({', '.join(parts)})"
+
+
+def _check_poses(name: str, rows: Ints, count: int) -> None:
+    reject_rows(name, (rows < 0) | (rows >= count), f"no such pose (there are {count})", rows)

@@ -1,0 +1,65 @@
+"""What only a simulator knows."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dqslam._checks import Floats, Ints, as_floats, as_ints, assign, reject_rows
+from dqslam._core import PoseModel
+from dqslam._repr import counted
+from dqslam.recording.poses import as_poses
+
+
+@dataclass(frozen=True, eq=False)
+class Truth:
+    """The answer that a simulator knows: for evaluation only."""
+
+    pose_model: PoseModel
+    poses: Floats
+    """world_from_robot, shape (n, d)."""
+    object_id: Ints
+    """Of every object of the world, detected or not; shape (o,)."""
+    center: Floats
+    """In the world, meters, shape (o, 3)."""
+    volume: Floats
+    """Cubic meters, shape (o,)."""
+    class_name: tuple[str, ...]
+    """One per object."""
+    ellipsoids: Floats | None = None
+    """Center and log-Cholesky shape, shape (o, 9); None when the objects are no ellipsoids."""
+    box_object_id: Ints | None = None
+    """Which object each box of the recording shows, whatever its id says; shape (m,)."""
+
+    def __post_init__(self) -> None:
+        """Check shapes and numbers."""
+        object_id = as_ints("truth.object_id", self.object_id)
+        count = len(object_id)
+        if len(set(object_id.tolist())) != count:
+            raise ValueError("truth.object_id: an id occurs twice")
+        if len(self.class_name) != count:
+            raise ValueError(f"truth.class_name: expected {count}, got {len(self.class_name)}")
+        volume = as_floats("truth.volume", self.volume, [count])
+        reject_rows("truth.volume", volume <= 0.0, "not positive", volume)
+        ellipsoids = self.ellipsoids
+        if ellipsoids is not None:
+            ellipsoids = as_floats("truth.ellipsoids", ellipsoids, [count, 9])
+        box_object_id = self.box_object_id
+        if box_object_id is not None:
+            box_object_id = as_ints("truth.box_object_id", box_object_id)
+            unknown = ~np.isin(box_object_id, object_id)
+            reject_rows("truth.box_object_id", unknown, "no such object", box_object_id)
+        assign(
+            self,
+            poses=as_poses("truth.poses", self.poses, self.pose_model),
+            object_id=object_id,
+            center=as_floats("truth.center", self.center, [count, 3]),
+            volume=volume,
+            class_name=tuple(self.class_name),
+            ellipsoids=ellipsoids,
+            box_object_id=box_object_id,
+        )
+
+    def __repr__(self) -> str:
+        """Show how many poses and objects there are."""
+        objects = counted(len(self.object_id), "object")
+        return f"Truth({self.pose_model.name}, {counted(len(self.poses), 'pose')}, {objects})"
