@@ -39,6 +39,7 @@ __all__: list[str] = [
     "StepReport",
     "Summary",
     "UnderConstrained",
+    "VariableKind",
     "axes_from_ellipsoid",
     "between",
     "compose",
@@ -384,7 +385,7 @@ class Graph:
 
 class Mode(enum.Enum):
     """
-    What is unknown.
+    Which variables are unknown.
     """
 
     MAPPING = 1
@@ -411,7 +412,7 @@ class LandmarkModel(enum.Enum):
 
 class Start(enum.Enum):
     """
-    Where an object starts.
+    How an object is started.
     """
 
     IDENTITY = 0
@@ -421,7 +422,7 @@ class Start(enum.Enum):
 
 class Schedule(enum.Enum):
     """
-    In which order poses are added.
+    The order in which poses are added.
     """
 
     BATCH = 0
@@ -442,7 +443,7 @@ class Loss(enum.Enum):
 
 class Backend(enum.Enum):
     """
-    Who carries out the steps.
+    The solver that minimizes.
     """
 
     CERES = 1
@@ -458,108 +459,143 @@ class Minimizer(enum.Enum):
 
 class SolveOptions:
     """
-    What a caller may choose.
+    Options of solve.
     """
-
-    landmark_model: LandmarkModel
-    loss: Loss
-    mode: Mode
-    residual: Residual
-    schedule: Schedule
-    start: Start
     def __init__(self, **kwargs: typing.Any) -> None:
         """
-        Any of the attributes as keywords.
+        Set any of the attributes by keywords; the others have their defaults.
         """
     def __repr__(self) -> str: ...
     @property
     def algebraic_sigma(self) -> float:
         """
-        Of both algebraic residuals, in their own unit.
+        Sigma of both algebraic residuals, in the unit of the residual.
         """
     @algebraic_sigma.setter
     def algebraic_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
     @property
     def backend(self) -> Backend:
         """
-        NATIVE: normal equations in blocks, boxes differentiated by hand; CERES: ceres::Solve on AutoDiff costs, slower, a second opinion.
+        NATIVE is this library's solver, which leaves algebraic residuals, dual quadrics and switchable constraints to Ceres; CERES minimizes everything with Ceres on AutoDiff costs, which is slower.
         """
     @backend.setter
     def backend(self, arg0: Backend) -> None: ...
     @property
     def function_tolerance(self) -> float:
         """
-        Stop when |change of cost| / cost falls below.
+        A batch stage stops when |change of cost| / cost is at most this.
         """
     @function_tolerance.setter
     def function_tolerance(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
     @property
     def grow_iterations(self) -> int:
         """
-        Levenberg-Marquardt steps after each addition.
+        The largest number of Levenberg-Marquardt iterations after each addition.
         """
     @grow_iterations.setter
     def grow_iterations(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
     @property
     def grow_min_views(self) -> int:
         """
-        Boxes an object needs before it is started.
+        GROW starts an object when it has this number of boxes; the last addition starts all objects.
         """
     @grow_min_views.setter
     def grow_min_views(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
     @property
     def grow_poses(self) -> int:
         """
-        Poses added at a time, or more:
+        GROW adds at least this number of poses at a time.
         """
     @grow_poses.setter
     def grow_poses(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
     @property
     def grow_rotation(self) -> float:
         """
-        While the sigma of odometry's rotation over them is below, radians.
+        GROW adds more than grow_poses poses as long as the sigma of odometry's rotation over the added poses is at most this, in radians.
         """
     @grow_rotation.setter
     def grow_rotation(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
     @property
     def grow_tolerance(self) -> float:
         """
-        Function tolerance of these steps.
+        The minimization after an addition stops when |change of cost| / cost is at most this.
         """
     @grow_tolerance.setter
     def grow_tolerance(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
     @property
+    def landmark_model(self) -> LandmarkModel:
+        """
+        The parametrization of the objects.
+        """
+    @landmark_model.setter
+    def landmark_model(self, arg0: LandmarkModel) -> None: ...
+    @property
+    def loss(self) -> Loss:
+        """
+        The robust loss on whole boxes.
+        """
+    @loss.setter
+    def loss(self, arg0: Loss) -> None: ...
+    @property
     def loss_scale(self) -> float:
         """
-        Of Huber and Cauchy, sigmas of a whole box.
+        Scale of the HUBER and CAUCHY losses, in sigmas of a whole box.
         """
     @loss_scale.setter
     def loss_scale(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
     @property
     def max_iterations(self) -> int:
         """
-        Of each batch stage.
+        The largest number of iterations of each batch stage.
         """
     @max_iterations.setter
     def max_iterations(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
     @property
     def minimizer(self) -> Minimizer:
         """
-        Of the last stage.
+        The minimizer of the last stage.
         """
     @minimizer.setter
     def minimizer(self, arg0: Minimizer) -> None: ...
     @property
+    def mode(self) -> Mode:
+        """
+        SLAM estimates poses and objects; MAPPING keeps the poses fixed.
+        """
+    @mode.setter
+    def mode(self, arg0: Mode) -> None: ...
+    @property
     def outlier_chi_square(self) -> float:
         """
-        Of the other losses: a box beyond it is an outlier (4 dof).
+        A box is an outlier if its chi-square (4 degrees of freedom) exceeds this; it is the threshold of all robust losses but HUBER and CAUCHY.
         """
     @outlier_chi_square.setter
     def outlier_chi_square(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def residual(self) -> Residual:
+        """
+        The residual of the boxes.
+        """
+    @residual.setter
+    def residual(self, arg0: Residual) -> None: ...
+    @property
+    def schedule(self) -> Schedule:
+        """
+        BATCH adds all poses at once; GROW adds a few poses at a time.
+        """
+    @schedule.setter
+    def schedule(self, arg0: Schedule) -> None: ...
+    @property
+    def start(self) -> Start:
+        """
+        The method by which objects are started.
+        """
+    @start.setter
+    def start(self, arg0: Start) -> None: ...
 
 class State:
     """
-    Poses and landmark parameters: where a solve starts.
+    Poses and landmark parameters at which a solve can start.
     """
     def __init__(
         self,
@@ -572,12 +608,12 @@ class State:
     @property
     def landmarks(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
         """
-        Shape (o, 9).
+        Landmark parameters, shape (o, 9).
         """
     @property
     def poses(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
         """
-        Shape (n, d).
+        Poses, shape (n, d).
         """
 
 class Summary:
@@ -589,137 +625,147 @@ class Summary:
     @property
     def converged(self) -> bool:
         """
-        The last stage met a stopping test and accepted a step.
+        Whether the last stage met a stopping test and accepted a step.
         """
     @property
     def evaluation_seconds(self) -> float:
         """
-        Of all stages: residuals and their derivatives.
+        Time for residuals and their derivatives in all stages, in seconds.
         """
     @property
     def final_cost(self) -> float:
         """
-        Likewise.
+        Half the sum of squared residuals, in sigmas and after the loss, at the end of the last stage.
         """
     @property
     def gradient_norm_end(self) -> float:
         """
-        Likewise at its end.
+        Infinity norm of the gradient at the end of the last stage.
         """
     @property
     def gradient_norm_start(self) -> float:
         """
-        Infinity norm at the start of the last stage.
+        Infinity norm of the gradient at the start of the last stage.
         """
     @property
     def initial_cost(self) -> float:
         """
-        Half the sum of squared residuals, in sigmas, after the loss.
+        Half the sum of squared residuals, in sigmas and after the loss, at the start of the first stage.
         """
     @property
     def iterations(self) -> int:
         """
-        Of all stages.
+        Number of iterations of all stages.
         """
     @property
     def linear_solver_seconds(self) -> float:
         """
-        Of all stages: orderings, factorizations and solutions.
+        Time to order, factorize and solve linear systems in all stages, in seconds.
         """
     @property
     def message(self) -> str:
         """
-        How it ended, in words.
+        The reason why the last stage ended.
         """
     @property
     def rejected_steps(self) -> int:
         """
-        Of all stages.
+        Number of rejected steps of all stages.
         """
     @property
     def seconds(self) -> float:
         """
-        Wall clock, all stages.
+        Wall-clock time of all stages in seconds.
         """
     @property
     def start_seconds(self) -> float:
         """
-        Of these, until all objects had a start.
+        The part of `seconds` until all objects had a start.
         """
 
 class Solution:
     """
-    The answer of solve.
+    The result of solve.
     """
     @property
     def dual_quadrics(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
         """
-        q1 .. q9, shape (o, 9).
+        q1 .. q9 of each object, shape (o, 9).
         """
     @property
     def inliers(self) -> typing.Annotated[numpy.typing.NDArray[numpy.bool], "[m, 1]"]:
         """
-        Boxes that fit their objects, shape (b,).
+        Whether each box fits its object, shape (b,).
         """
     @property
     def landmarks(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
         """
-        Parameters of the model, shape (o, 9).
+        Parameters in the landmark model, shape (o, 9).
         """
     @property
     def poses(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
         """
-        Shape (n, d).
+        Poses, shape (n, d).
         """
     @property
-    def summary(self) -> Summary: ...
+    def summary(self) -> Summary:
+        """
+        How the solve went.
+        """
     @property
     def svd_singular_values(
         self,
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
         """
-        Of each object's SVD start, shape (o, 10), descending; NaN where not used.
+        Singular values of each object's SVD start, shape (o, 10), descending; NaN where the SVD was not used.
         """
+
+class VariableKind(enum.Enum):
+    """
+    What a parameter belongs to.
+    """
+
+    OBJECT = 1
+    POSE = 0
 
 class UnderConstrained:
     """
     A parameter that neither the data nor the priors determine.
     """
-    class Kind(enum.Enum):
-        OBJECT: typing.ClassVar[UnderConstrained.Kind]
-        POSE: typing.ClassVar[UnderConstrained.Kind]
-
     @property
-    def kind(self) -> UnderConstrained.Kind: ...
+    def kind(self) -> VariableKind:
+        """
+        Whether it belongs to a pose or an object.
+        """
     @property
     def parameter(self) -> int:
         """
-        Of its tangent.
+        Index of the parameter in its tangent.
         """
     @property
     def row(self) -> int:
         """
-        Of the pose or the object in the graph.
+        Row of the pose or the object in the graph.
         """
 
 class Covariance:
     """
-    Marginal covariances; the first pose is the gauge.
+    Marginal covariances with the first pose fixed.
     """
     @property
     def objects(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
         """
-        Of the landmark parameters, shape (o, 81); NaN where under-constrained.
+        Covariances of the landmark parameters, shape (o, 81); NaN where under-constrained.
         """
     @property
     def poses(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
         """
-        In the frames of the poses, shape (n, k * k); NaN where under-constrained.
+        Covariances in the frames of the poses, shape (n, k * k); NaN where under-constrained.
         """
     @property
     def under_constrained(self) -> list[UnderConstrained]:
         """
-        The first such parameter of each pose and object.
+        The first under-constrained parameter of each pose and object that has one.
         """
 
 class Fit:
@@ -729,22 +775,22 @@ class Fit:
     @property
     def box_redundancy(self) -> float:
         """
-        Sum of 1 - leverage over them.
+        Sum of 1 - leverage over all edges of boxes.
         """
     @property
     def box_squares(self) -> float:
         """
-        Sum over all edges of boxes, in sigmas.
+        Sum of the squared residuals of all edges of boxes, in sigmas.
         """
     @property
     def odometry_leverage(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
         """
-        0..1, shape (n, k): 1 where the step alone determines what it measures.
+        Leverages from 0 to 1, shape (n, k); 1 where the step alone determines what it measures.
         """
     @property
     def odometry_residuals(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
         """
-        In sigmas, shape (n, k), one row a step.
+        Residuals in sigmas, shape (n, k), one row for each step.
         """
 
 class Relocation:
@@ -1104,7 +1150,7 @@ def compose(
 
 def covariance(graph: Graph, options: SolveOptions, state: State) -> Covariance:
     """
-    Marginal covariances at a state; at the true state, the posterior Cramer-Rao bound.
+    Marginal covariances at a state. At the true state they are the posterior Cramer-Rao bound.
     """
 
 def dead_reckon(
@@ -1148,7 +1194,7 @@ def ellipsoid_from_dual_quadric(
 
 def fit(graph: Graph, options: SolveOptions, state: State) -> Fit:
     """
-    Residuals and leverage of odometry and boxes: what variance components come from.
+    Residuals and leverage of odometry and boxes, from which variance components are estimated.
     """
 
 def joint_covariance(
@@ -1159,7 +1205,7 @@ def joint_covariance(
     objects: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex],
 ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
     """
-    Joint covariance of some poses (k rows each), then objects (9 rows each).
+    Joint covariance of some poses and objects: k rows for each pose, then 9 rows for each object.
     """
 
 def minus(
@@ -1212,7 +1258,7 @@ def relocalize(
 
 def solve(graph: Graph, options: SolveOptions = ..., start: State | None = None) -> Solution:
     """
-    Solve a graph, from its odometry or from a given start. Releases the GIL; Ctrl-C raises KeyboardInterrupt; ValueError for bad input.
+    Solve a graph, from its odometry or from a given start. Bad input raises ValueError. The GIL is released; Ctrl-C raises KeyboardInterrupt.
     """
 
 def world_from_camera(

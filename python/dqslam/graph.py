@@ -36,7 +36,7 @@ class Graph:
     def __repr__(self) -> str:
         """Show the pose model, and how many poses, boxes and objects there are."""
         poses = counted(len(self.timestamps), "pose")
-        boxes = counted(len(self.core.boxes), "box")
+        boxes = counted(len(self.core.boxes.pose), "box")
         objects = counted(len(self.object_ids), "object")
         return f"Graph({self.core.pose_model.name}, {poses}, {boxes} of {objects})"
 

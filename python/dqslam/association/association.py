@@ -62,8 +62,8 @@ class Association:
         """
         scene = self.scene
         names = np.append(self.ids, -1)
-        names[list(scene.left_out)] = -1
-        object_id = names[scene.box_object]
+        names[list(scene.labels.left_out)] = -1
+        object_id = names[scene.labels.object_rows]
         used = object_id >= 0
         if not used.any():
             raise ValueError("associate has found no object at rest: there is nothing to solve")
