@@ -34,21 +34,31 @@ __all__: list[str] = [
     "State",
     "StepReport",
     "Summary",
+    "adjoint",
     "axes_from_ellipsoid",
     "between",
+    "box_chi_squares",
     "compose",
     "covariance",
     "dead_reckon",
+    "differentiate_boxes",
     "dual_quadric_from_ellipsoid",
     "dual_quadric_matrix",
+    "dual_quadric_shapes",
+    "edges_out_of_sight",
     "ellipsoid_from_axes",
     "ellipsoid_from_dual_quadric",
+    "ellipsoid_shapes",
     "fit",
+    "inverse",
     "joint_covariance",
+    "log_semi_axes_jacobian",
     "minus",
     "plus",
     "project_to_boxes",
+    "project_to_outlines",
     "relocalize",
+    "shape_from_axes_jacobian",
     "solve",
     "world_from_camera",
 ]
@@ -79,6 +89,12 @@ class Camera:
     ) -> None:
         """
         Focal lengths, principal point and size in pixels; k1 k2 p1 p2 k3; the SE(3) mount.
+        """
+    def distort_boxes(
+        self, undistorted: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"]
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Boxes as recorded, shape (n, 4): inverts undistort_boxes, to a small part of a pixel.
         """
     def distort_points(
         self, undistorted: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"]
@@ -683,7 +699,7 @@ class OnlineOptions:
     @property
     def loop_absence(self) -> int:
         """
-        Poses without a sight before an object closes a loop.
+        Poses without a observation before an object closes a loop.
         """
     @loop_absence.setter
     def loop_absence(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
@@ -791,7 +807,7 @@ class StepReport:
     @property
     def linearized(self) -> int:
         """
-        Sights, in the window and to keep what lies before it.
+        Observations, in the window and to keep what lies before it.
         """
     @property
     def pose(self) -> int:
@@ -804,19 +820,19 @@ class StepReport:
         Young objects were started again.
         """
     @property
+    def smoothed_observations(self) -> int:
+        """
+        Observations linearized there.
+        """
+    @property
     def smoothed_poses(self) -> int:
         """
         Poses minimized beside the window; 0 at most steps.
         """
     @property
-    def smoothed_observations(self) -> int:
-        """
-        Sights linearized there.
-        """
-    @property
     def undefined(self) -> int:
         """
-        Sights of the window whose objects are not in front.
+        Observations of the window whose objects are not in front.
         """
     @property
     def window_objects(self) -> int:
@@ -893,14 +909,14 @@ class Session:
         """
     def relabel(
         self,
-        sight: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
+        observation: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
         object: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
         ellipsoid: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"] = ...,
         log_size_mean: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] = ...,
         log_size_sigma: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] = ...,
     ) -> None:
         """
-        Give boxes (n,), by the rows of their sights, to other objects (n,): -1 waits, num_objects + i is a new object that starts from ellipsoid (m, 9), log-Cholesky, in the world.
+        Give boxes (n,), by the rows of their observations, to other objects (n,): -1 waits, num_objects + i is a new object that starts from ellipsoid (m, 9), log-Cholesky, in the world.
         """
     def scale_odometry(
         self,
@@ -942,6 +958,13 @@ class Session:
         Shape (n, d).
         """
 
+def adjoint(
+    model: PoseModel, a_from_b: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"]
+) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Matrices (n, k, k) that turn a small motion in the frame of b into the same motion in the frame of a.
+    """
+
 def axes_from_ellipsoid(
     ellipsoid: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[9, 1]"],
 ) -> tuple[
@@ -960,6 +983,19 @@ def between(
 ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
     """
     Relative poses row by row: b_from_c, shape (n, d).
+    """
+
+def box_chi_squares(
+    model: PoseModel,
+    camera: Camera,
+    poses: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    ellipsoids: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    boxes: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    covariances: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    truncated: typing.Annotated[numpy.typing.ArrayLike, numpy.bool, "[m, n]"],
+) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+    """
+    Chi-squares (n,), 4 degrees of freedom, of boxes (n, 4) with covariances (n, 16) [px^2] and edges that the image border cut (n, 4), for ellipsoid i from pose i. An edge that only bounds the object counts where the prediction ends inside. Infinite unless the object is strictly in front.
     """
 
 def compose(
@@ -985,6 +1021,20 @@ def dead_reckon(
     Chain relative poses (n, d) behind the first (d,): shape (n + 1, d).
     """
 
+def differentiate_boxes(
+    model: PoseModel,
+    camera: Camera,
+    poses: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    ellipsoids: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+) -> tuple[
+    typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"],
+    typing.Annotated[numpy.typing.NDArray[numpy.bool], "[m, 1]"],
+    numpy.typing.NDArray[numpy.float64],
+]:
+    """
+    What project_to_boxes returns, and Jacobians (n, 4, k + 9) of the boxes by the tangent of the pose, then by the ellipsoid; NaN where it is not strictly in front.
+    """
+
 def dual_quadric_from_ellipsoid(
     ellipsoid: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[9, 1]"],
 ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[9, 1]"]:
@@ -997,6 +1047,23 @@ def dual_quadric_matrix(
 ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
     """
     The 4 x 4 matrix Q* of q1 .. q9, with Q*(4,4) = 1.
+    """
+
+def dual_quadric_shapes(
+    quadrics: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Shapes S = c c^T - Q*_33 [m^2], (n, 3, 3), of any signature, of q1 .. q9 (n, 9).
+    """
+
+def edges_out_of_sight(
+    model: PoseModel,
+    camera: Camera,
+    poses: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    ellipsoids: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+) -> typing.Annotated[numpy.typing.NDArray[numpy.bool], "[m, n]"]:
+    """
+    Edges (n, 4) of the same boxes that the outline touches outside the image, where no detector sees it.
     """
 
 def ellipsoid_from_axes(
@@ -1015,9 +1082,23 @@ def ellipsoid_from_dual_quadric(
     Log-Cholesky parameters (9,) of q1 .. q9; ValueError when q is no ellipsoid.
     """
 
+def ellipsoid_shapes(
+    ellipsoids: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Shapes S [m^2], (n, 3, 3), of log-Cholesky parameters (n, 9).
+    """
+
 def fit(graph: Graph, options: SolveOptions, state: State) -> Fit:
     """
     Residuals and leverage of odometry and boxes: what variance components come from.
+    """
+
+def inverse(
+    model: PoseModel, a_from_b: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"]
+) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+    """
+    Invert poses row by row: b_from_a, shape (n, d).
     """
 
 def joint_covariance(
@@ -1029,6 +1110,13 @@ def joint_covariance(
 ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
     """
     Joint covariance of some poses (k rows each), then objects (9 rows each).
+    """
+
+def log_semi_axes_jacobian(
+    ellipsoid: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[9, 1]"],
+) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 9]"]:
+    """
+    Logarithms of the semi-axes, descending, by the parameters of an ellipsoid: (3, 9).
     """
 
 def minus(
@@ -1062,6 +1150,18 @@ def project_to_boxes(
     Boxes (n, 4) of ellipsoid i from pose i [undistorted px], and whether it is strictly in front (n,); NaN where it is not.
     """
 
+def project_to_outlines(
+    model: PoseModel,
+    camera: Camera,
+    poses: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    ellipsoids: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    *,
+    points: typing.SupportsInt | typing.SupportsIndex = 128,
+) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Outlines (n, points, 2) of ellipsoid i from pose i [undistorted px], the last point the first again; NaN where it is not strictly in front.
+    """
+
 def relocalize(
     pose_model: PoseModel,
     camera: Camera,
@@ -1077,6 +1177,14 @@ def relocalize(
 ) -> Relocation:
     """
     Find the pose from boxes (b, 4) of objects (o, 9), with covariances (o, 81) and (b, 16); the candidates of a box are rows of objects that it may show. ValueError where there is none.
+    """
+
+def shape_from_axes_jacobian(
+    semi_axes: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
+    orientation_xyzw: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 1]"],
+) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 6]"]:
+    """
+    Log-Cholesky shape by the logarithms of the semi-axes and a turn about each [rad]: (6, 6).
     """
 
 def solve(graph: Graph, options: SolveOptions = ..., start: State | None = None) -> Solution:

@@ -1,15 +1,16 @@
-from dataclasses import replace
 from itertools import product
 
 import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from dqslam import Detections, PoseModel, _core
-from dqslam.association import CHI2_GATE, box_chi2
+from dqslam import PoseModel, _core
+from dqslam.association import CHI2_GATE
 from dqslam.association.assignment import assign
 from dqslam.association.gating import GATE, PredictedBoxes, pair_costs, predict_boxes
-from scenes import CAMERA, outline
+from dqslam.association.scene_map import SceneMap
+from dqslam.assumptions import BoxNoise
+from scenes import CAMERA, cut_by_the_border, outline
 
 POSE = np.array([0.2, -0.1, 0.3, 0.0, 0.0, np.sin(0.1), np.cos(0.1)])
 SIGMAS = np.concatenate([np.full(3, 0.02), np.full(3, 0.004), np.full(3, 0.05), np.full(6, 0.03)])
@@ -140,19 +141,15 @@ def test_what_nearly_touches_the_camera_is_not_predicted():
         assert 1 in found.object_row
 
 
-def test_box_chi2_with_edges_that_the_image_cut():
-    """A cut edge fits when the object reaches it: then, only the others count."""
-    place = ellipsoid([0, 0, 4])
-    box, _ = _core.project_to_boxes(PoseModel.SE3, CAMERA, np.eye(7)[6:], place[None])
-    cut = np.array([[False, False, True, False]])
-    for inwards, expected in ((6.0, 1.0), (-6.0, 1.0 + 36.0 / 9.0)):
-        seen = Detections(
-            [0], box + [2.0, 0.0, -inwards, 0.0], [1.0], [1], [0], {1: "cup"}, truncated=cut
-        )
-        args = (CAMERA, PoseModel.SE3, np.eye(7)[6:], place[None])
-        assert box_chi2(*args, seen, BOX_COVARIANCE[None])[0] == pytest.approx(expected)
-        whole = replace(seen, truncated=np.zeros((1, 4), dtype=bool))
-        assert box_chi2(*args, whole, BOX_COVARIANCE[None])[0] == pytest.approx(1.0 + 4.0)
+def test_a_perfect_estimate_fits_its_boxes_where_the_border_cuts_them():
+    """Top and bottom are where the border cuts the object, not where it is highest."""
+    recording, ellipsoids = cut_by_the_border()
+    rows = np.arange(4)
+    scene = SceneMap(recording, rows, box_noise=BoxNoise())
+    np.testing.assert_allclose(scene.chi2(rows, ellipsoids, blur=0.0), 0.0, atol=1e-4)
+    # Not all goes: an object half as large again sticks out to the left, at least.
+    larger = ellipsoids + np.r_[0, 0, 0, np.log([1.5] * 3), 0, 0, 0]
+    assert (scene.chi2(rows, larger, blur=0.0) > 2.0).all()
 
 
 # --- assignment

@@ -2,10 +2,7 @@
 
 #include <ceres/problem.h>
 
-#include <algorithm>
-#include <cmath>
-#include <limits>
-
+#include "dqslam/costs/box_chi_square.h"
 #include "dqslam/geometry/dispatch.h"
 #include "dqslam/solver/assembly.h"
 #include "dqslam/solver/ceres_backend.h"
@@ -47,14 +44,13 @@ Eigen::VectorXd BoxCosts(const PreparedGraph& prepared,
     for (int row = 0; row < graph.boxes.size(); ++row) {
       const double* pose = state.poses.row(graph.boxes.pose[row]).data();
       const double* parameters = state.landmarks.row(graph.boxes.object[row]).data();
-      Eigen::Vector4d predicted;
       const Surface<double> surface =
           ToCamera(LocateCamera<Pose>(pose, prepared.mount), Landmark::Unpack(parameters));
-      const bool defined = ProjectToBox(surface, graph.camera, &predicted);
-      Eigen::Vector4d error = predicted - graph.boxes.box.row(row).transpose();
-      IgnoreBeyond(OneSidedEdges(prepared, row, surface), &error);
-      costs[row] = defined ? 0.5 * (prepared.box_sqrt_information[row] * error).squaredNorm()
-                           : std::numeric_limits<double>::infinity();
+      costs[row] = 0.5 * BoxChiSquare(surface,
+                                      graph.camera,
+                                      graph.boxes.box.row(row),
+                                      graph.boxes.truncated.row(row),
+                                      prepared.box_sqrt_information[row]);
     }
   });
   return costs;

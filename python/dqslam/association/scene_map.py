@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dqslam import _core
-from dqslam.association.gating import CONFUSED, box_chi2
+from dqslam.association.gating import CONFUSED
 from dqslam.association.noise import StepNoise, corrected
 from dqslam.assumptions import BoxNoise, OdometryNoise, SizePrior, SizePriors
 from dqslam.graph import Graph, build_graph
@@ -302,13 +302,20 @@ class SceneMap:
     ) -> NDArray[np.float64]:
         """Compare boxes with the projections of ellipsoids (b, 9): chi-square with 4 dof, (b,).
 
-        ``blur`` is the standard deviation, in pixels, that is added to the boxes' own.
+        Infinite where the object is not in front of the camera. ``blur`` is the standard deviation,
+        in pixels, that is added to the boxes' own.
         """
-        boxes = self.recording.detections.select(rows)
-        poses = self.poses[boxes.pose]
-        model = self.recording.odometry.pose_model
+        detections = self.recording.detections
         covariance = self.box_covariance[rows] + blur**2 * np.eye(4)
-        return box_chi2(self.recording.camera, model, poses, ellipsoids, boxes, covariance)
+        return _core.box_chi_squares(
+            self.recording.odometry.pose_model,
+            self.recording.camera,
+            self.poses[detections.pose[rows]],
+            ellipsoids,
+            detections.box[rows],
+            covariance.reshape(-1, 16),
+            detections.truncated[rows],
+        )
 
     # ---- inside
 

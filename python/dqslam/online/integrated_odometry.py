@@ -8,7 +8,6 @@ import numpy as np
 
 from dqslam import _core
 from dqslam._checks import Floats
-from dqslam.association.thinning import transport
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +37,7 @@ class Leg:
         """Go on by a step."""
         k = len(covariance)
         is_translation = np.arange(k) < (2 if k == 3 else 3)
-        moved = transport(pose_model, relative[None])[0]
+        moved = _core.adjoint(pose_model, _core.inverse(pose_model, relative[None]))[0]
         before = (self.covariance, self.per_translation, self.per_rotation)
         step = (covariance, np.diag(is_translation * 1.0), np.diag(~is_translation * 1.0))
         return Leg(

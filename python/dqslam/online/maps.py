@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
 # Where a result says nothing of its uncertainty: sigma of the center [m] and of the log axes.
 _CENTER_SIGMA_M, _LOG_SIGMA = 0.05, 0.1
-_STEP = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,27 +83,12 @@ def _shape_covariance(semi_axes: Floats, orientation_xyzw: Floats, log_sigma: Fl
     an angle a in the plane of axes i and j changes log S by (log s_i - log s_j) a. Angles have the
     sigma at which that equals the larger of the two log sigmas, at most half a radian.
     """
-    center = np.zeros(3)
-    origin = _core.ellipsoid_from_axes(center, semi_axes, orientation_xyzw)[3:]
-    columns = []
-    for axis in range(3):
-        grown = semi_axes.copy()
-        grown[axis] *= np.exp(_STEP)
-        moved = _core.ellipsoid_from_axes(center, grown, orientation_xyzw)[3:]
-        columns.append((moved - origin) / _STEP * log_sigma[axis])
-    from scipy.spatial.transform import Rotation
-
-    turn = Rotation.from_quat(orientation_xyzw)
     logs = np.log(semi_axes)
-    for axis in range(3):
-        i, j = (axis + 1) % 3, (axis + 2) % 3
-        apart = abs(logs[i] - logs[j]) + 1e-3
-        sigma = min(max(log_sigma[i], log_sigma[j]) / apart, 0.5)
-        small = Rotation.from_rotvec(_STEP * np.eye(3)[axis])
-        moved = _core.ellipsoid_from_axes(center, semi_axes, (turn * small).as_quat())[3:]
-        columns.append((moved - origin) / _STEP * sigma)
-    jacobian = np.array(columns).T
-    return np.asarray(jacobian @ jacobian.T + 1e-10 * np.eye(6))
+    apart = np.abs(np.roll(logs, -1) - np.roll(logs, -2)) + 1e-3
+    wider = np.maximum(np.roll(log_sigma, -1), np.roll(log_sigma, -2))
+    sigma = np.concatenate([log_sigma, np.minimum(wider / apart, 0.5)])
+    spread = _core.shape_from_axes_jacobian(semi_axes, orientation_xyzw) * sigma
+    return np.asarray(spread @ spread.T + 1e-10 * np.eye(6))
 
 
 def with_mount(camera: _core.Camera, robot_from_camera: ArrayLike | None) -> _core.Camera:
