@@ -28,11 +28,14 @@ class PredictedBoxes:
     """Pixels, shape (p, 4)."""
     covariance: NDArray[np.float64]
     """Of pose and object together, without the detector's noise, pixels^2, shape (p, 4, 4)."""
+    out_of_sight: NDArray[np.bool_]
+    """Edges that the object touches outside the image, shape (p, 4)."""
 
     def without(self, objects: NDArray[np.bool_]) -> PredictedBoxes:
         """Leave out some objects: a flag for each that ``object_row`` may name."""
         kept = ~objects[self.object_row]
-        return PredictedBoxes(self.object_row[kept], self.box[kept], self.covariance[kept])
+        fields = (self.object_row, self.box, self.covariance, self.out_of_sight)
+        return PredictedBoxes(*(field[kept] for field in fields))
 
 
 def predict_boxes(
@@ -59,7 +62,9 @@ def predict_boxes(
     with np.errstate(over="ignore", invalid="ignore"):
         spread = jacobian[row] @ joint @ jacobian[row].transpose(0, 2, 1)
         known = np.trace(spread, axis1=1, axis2=2) < size**2  # false where it is not a number
-    return PredictedBoxes(row[known], box[row[known]], spread[known])
+    row = row[known]
+    out_of_sight = _core.edges_out_of_sight(pose_model, camera, here[row], ellipsoids[row])
+    return PredictedBoxes(row, box[row], spread[known], out_of_sight)
 
 
 def in_image(
@@ -108,20 +113,26 @@ def pair_costs(
 ) -> PairCosts:
     """Compare boxes (b, 4) with predicted ones: ``d^2 + ln |2 pi S| - 2 ln p(class)``.
 
-    Edges that the image border cut take no part. ``class_probability`` (b, p) is that of the
-    box's class given the object. A box of something else may lie anywhere in the image and have
+    Edges that the image border cut take no part. On a box with such an edge, nor do those that the
+    object touches outside the image, unless it ends inside. ``class_probability`` (b, p) is that of
+    the box's class given the object. A box of something else may lie anywhere in the image and have
     any size up to half of it.
     """
-    cut = truncated[:, None, :]
-    error = np.where(cut, 0.0, box[:, None] - predicted.box)
-    # A cut edge: no error, and a variance that the determinant does not see.
+    error = box[:, None] - predicted.box
+    reaches = error * [-1.0, -1.0, 1.0, 1.0] < 0.0
+    is_cut = truncated.any(axis=1)[:, None, None]
+    ignored = truncated[:, None, :] | (is_cut & predicted.out_of_sight & reaches)
+    error = np.where(ignored, 0.0, error)
+    # An edge that is ignored: no error, and a variance that the determinant does not see.
     spread = predicted.covariance + box_covariance[:, None]
-    spread = np.where(cut[..., :, None] | cut[..., None, :], 0.0, spread)
-    spread = spread + (cut / (2 * np.pi))[..., None] * np.eye(4)
+    spread = np.where(ignored[..., :, None] | ignored[..., None, :], 0.0, spread)
+    spread = spread + (ignored / (2 * np.pi))[..., None] * np.eye(4)
     d2 = np.sum(error * np.linalg.solve(spread, error[..., None])[..., 0], axis=-1)
     log_det = np.linalg.slogdet(2 * np.pi * spread)[1]
-    edges = 4 - truncated.sum(axis=1)
-    inside = (d2 <= GATE[edges][:, None]) & (edges > 0)[:, None]
-    cost = np.where(inside, d2 + log_det - 2 * np.log(class_probability), np.inf)
-    volume = (camera.width * camera.height) ** 2 / 4.0
-    return PairCosts(cost=cost, null=2 * np.log(volume) * edges / 4.0)
+    edges = 4 - ignored.sum(axis=2)
+    inside = (d2 <= GATE[edges]) & (edges > 0)
+    # What an object says nothing of is anywhere, as if the box showed something else.
+    anywhere = 2 * np.log((camera.width * camera.height) ** 2 / 4.0) / 4.0
+    null = anywhere * (4 - truncated.sum(axis=1))
+    cost = d2 + log_det - 2 * np.log(class_probability) + null[:, None] - anywhere * edges
+    return PairCosts(cost=np.where(inside, cost, np.inf), null=null)
