@@ -1,16 +1,29 @@
 #include <pybind11/eigen.h>
 #include <pybind11/native_enum.h>
+#include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 
+#include <tuple>
+#include <vector>
+
 #include "bindings.h"
+#include "dqslam/costs/box_chi_square.h"
+#include "dqslam/geometry/axes_jacobians.h"
 #include "dqslam/geometry/batch.h"
 #include "dqslam/geometry/ellipsoid.h"
+#include "dqslam/geometry/outline.h"
 
 namespace py = pybind11;
 using namespace pybind11::literals;
 
 namespace dqslam {
 namespace {
+
+/// Matrices of so many rows that are stacked in a table, as one array (n, rows, columns).
+py::array_t<double> Unstack(const RowMatrix& stacked, py::ssize_t rows) {
+  const std::vector<py::ssize_t> shape = {stacked.rows() / rows, rows, stacked.cols()};
+  return py::array(py::cast(stacked)).reshape(shape);
+}
 
 Camera MakeCamera(double fx,
                   double fy,
@@ -69,7 +82,11 @@ void BindCamera(py::module_& m) {
       .def("undistort_boxes",
            &Camera::UndistortBoxes,
            "distorted"_a,
-           "Boxes, shape (n, 4), each edge undistorted at its middle.");
+           "Boxes, shape (n, 4), each edge undistorted at its middle.")
+      .def("distort_boxes",
+           &Camera::DistortBoxes,
+           "undistorted"_a,
+           "Boxes as recorded, shape (n, 4): inverts undistort_boxes, to a small part of a pixel.");
 }
 
 void BindPoses(py::module_& m) {
@@ -85,6 +102,21 @@ void BindPoses(py::module_& m) {
         "a_from_b"_a,
         "a_from_c"_a,
         "Relative poses row by row: b_from_c, shape (n, d).");
+  m.def("inverse",
+        &InverseRows,
+        "model"_a,
+        "a_from_b"_a,
+        "Invert poses row by row: b_from_a, shape (n, d).");
+  m.def(
+      "adjoint",
+      [](PoseModel model, const RowMatrix& a_from_b) {
+        const RowMatrix adjoints = AdjointRows(model, a_from_b);
+        return Unstack(adjoints, adjoints.cols());
+      },
+      "model"_a,
+      "a_from_b"_a,
+      "Matrices (n, k, k) that turn a small motion in the frame of b into the same motion in the "
+      "frame of a.");
   m.def("plus",
         &PlusRows,
         "model"_a,
@@ -138,6 +170,29 @@ void BindEllipsoid(py::module_& m) {
         &DualQuadricMatrix,
         "quadric"_a,
         "The 4 x 4 matrix Q* of q1 .. q9, with Q*(4,4) = 1.");
+  m.def(
+      "ellipsoid_shapes",
+      [](const RowMatrix& ellipsoids) { return Unstack(EllipsoidShapeRows(ellipsoids), 3); },
+      "ellipsoids"_a,
+      "Shapes S [m^2], (n, 3, 3), of log-Cholesky parameters (n, 9).");
+  m.def(
+      "dual_quadric_shapes",
+      [](const RowMatrix& quadrics) { return Unstack(DualQuadricShapeRows(quadrics), 3); },
+      "quadrics"_a,
+      "Shapes S = c c^T - Q*_33 [m^2], (n, 3, 3), of any signature, of q1 .. q9 (n, 9).");
+  m.def("log_semi_axes_jacobian",
+        &LogSemiAxesJacobian,
+        "ellipsoid"_a,
+        "Logarithms of the semi-axes, descending, by the parameters of an ellipsoid: (3, 9).");
+  m.def(
+      "shape_from_axes_jacobian",
+      &ShapeFromAxesJacobian,
+      "semi_axes"_a,
+      "orientation_xyzw"_a,
+      "Log-Cholesky shape by the logarithms of the semi-axes and a turn about each [rad]: (6, 6).");
+}
+
+void BindProjection(py::module_& m) {
   m.def("project_to_boxes",
         &ProjectToBoxesRows,
         "model"_a,
@@ -146,6 +201,61 @@ void BindEllipsoid(py::module_& m) {
         "ellipsoids"_a,
         "Boxes (n, 4) of ellipsoid i from pose i [undistorted px], and whether it is strictly in "
         "front (n,); NaN where it is not.");
+  m.def("edges_out_of_sight",
+        &EdgesOutOfSightRows,
+        "model"_a,
+        "camera"_a,
+        "poses"_a,
+        "ellipsoids"_a,
+        "Edges (n, 4) of the same boxes that the outline touches outside the image, where no "
+        "detector sees it.");
+  m.def(
+      "differentiate_boxes",
+      [](PoseModel model,
+         const Camera& camera,
+         const RowMatrix& poses,
+         const RowMatrix& ellipsoids) {
+        const auto [boxes, in_front, jacobians] =
+            DifferentiateBoxesRows(model, camera, poses, ellipsoids);
+        return std::make_tuple(boxes, in_front, Unstack(jacobians, kBoxSize));
+      },
+      "model"_a,
+      "camera"_a,
+      "poses"_a,
+      "ellipsoids"_a,
+      "What project_to_boxes returns, and Jacobians (n, 4, k + 9) of the boxes by the tangent of "
+      "the pose, then by the ellipsoid; NaN where it is not strictly in front.");
+  m.def(
+      "project_to_outlines",
+      [](PoseModel model,
+         const Camera& camera,
+         const RowMatrix& poses,
+         const RowMatrix& ellipsoids,
+         int points) {
+        return Unstack(ProjectToOutlinesRows(model, camera, poses, ellipsoids, points), points);
+      },
+      "model"_a,
+      "camera"_a,
+      "poses"_a,
+      "ellipsoids"_a,
+      py::kw_only(),
+      "points"_a = kOutlinePoints,
+      "Outlines (n, points, 2) of ellipsoid i from pose i [undistorted px], the last point the "
+      "first again; NaN where it is not strictly in front.");
+  m.def(
+      "box_chi_squares",
+      &BoxChiSquareRows,
+      "model"_a,
+      "camera"_a,
+      "poses"_a,
+      "ellipsoids"_a,
+      "boxes"_a,
+      "covariances"_a,
+      "truncated"_a,
+      "Chi-squares (n,), 4 degrees of freedom, of boxes (n, 4) with covariances (n, 16) [px^2] and "
+      "edges that the image border cut (n, 4), for ellipsoid i from pose i. An edge that only "
+      "bounds the object counts where the prediction ends inside. Infinite unless the object is "
+      "strictly in front.");
 }
 
 }  // namespace
@@ -158,6 +268,7 @@ void BindGeometry(py::module_& m) {
   BindCamera(m);
   BindPoses(m);
   BindEllipsoid(m);
+  BindProjection(m);
 }
 
 }  // namespace dqslam

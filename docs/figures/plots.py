@@ -11,7 +11,6 @@ from PIL import Image, ImageDraw
 
 from dqslam import _core, io, load_scenario, simulate
 from dqslam.cli import main
-from dqslam.metrics import project_outlines
 
 HERE = Path(__file__).parent
 POSE = 45  # of the picture with outlines
@@ -30,9 +29,9 @@ def paint(truth, camera, pose, path):
     draw = ImageDraw.Draw(image)
     draw.rectangle([0, 150, camera.width, camera.height], fill=(104, 98, 92))
     seen_from = _core.world_from_camera(truth.pose_model, camera, truth.poses[[pose]])
-    here = np.repeat(seen_from, len(truth.ellipsoids), axis=0)
-    outlines = project_outlines(camera, here, truth.ellipsoids)
-    distance = np.linalg.norm(truth.center - here[:, :3], axis=1)
+    here = np.repeat(truth.poses[[pose]], len(truth.ellipsoids), axis=0)
+    outlines = _core.project_to_outlines(truth.pose_model, camera, here, truth.ellipsoids)
+    distance = np.linalg.norm(truth.center - seen_from[:, :3], axis=1)
     for row in np.argsort(-distance):
         if np.isnan(outlines[row]).any():
             continue

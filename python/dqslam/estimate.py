@@ -6,15 +6,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from dqslam._checks import Bools, Floats, Ints
-from dqslam._core import Camera, PoseModel, axes_from_ellipsoid
+from dqslam._core import Camera, PoseModel, axes_from_ellipsoid, dual_quadric_shapes
 from dqslam._repr import counted
-
-
-def quadric_shapes(dual_quadrics: Floats) -> Floats:
-    """Return S = c c^T - Q*_33 [m^2], shape (o, 3, 3), of rows q1 .. q9, shape (o, 9)."""
-    upper_left = dual_quadrics[:, [[0, 1, 2], [1, 4, 5], [2, 5, 7]]]
-    centers = dual_quadrics[:, [3, 6, 8]]
-    return np.asarray(centers[:, :, None] * centers[:, None, :] - upper_left)
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +64,7 @@ class Estimate:
     @property
     def shapes(self) -> Floats:
         """Shapes S of the objects, square meters, (o, 3, 3); of any signature."""
-        return quadric_shapes(self.dual_quadrics)
+        return dual_quadric_shapes(self.dual_quadrics)
 
     @property
     def semi_axes(self) -> Floats:

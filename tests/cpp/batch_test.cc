@@ -35,6 +35,9 @@ TYPED_TEST(Rows, DoWhatThePoseModelDoesRowByRow) {
   const RowMatrix between = BetweenRows(TypeParam::kModel, a, b);
   const RowMatrix minus = MinusRows(TypeParam::kModel, b, a);
   const RowMatrix plus = PlusRows(TypeParam::kModel, a, minus);
+  const RowMatrix inverse = InverseRows(TypeParam::kModel, a);
+  const RowMatrix adjoint = AdjointRows(TypeParam::kModel, a);
+  constexpr int k = TypeParam::kTangentSize;
   ASSERT_EQ(composed.rows(), this->kRows);
   for (int row = 0; row < this->kRows; ++row) {
     Eigen::Matrix<double, TypeParam::kSize, 1> pose;
@@ -50,6 +53,10 @@ TYPED_TEST(Rows, DoWhatThePoseModelDoesRowByRow) {
     Plus<TypeParam>(a.row(row).data(), tangent.data(), pose.data());
     TypeParam::Normalize(pose.data());
     EXPECT_EQ(plus.row(row), pose.transpose());
+    TypeParam::Compose(a.row(row).data(), inverse.row(row).data(), pose.data());
+    TypeParam::ToTangent(pose.data(), tangent.data());
+    EXPECT_LT(tangent.norm(), 1e-14);
+    EXPECT_EQ(adjoint.middleRows(k * row, k), Adjoint<TypeParam>(a.row(row).data()));
   }
 }
 
@@ -91,6 +98,51 @@ TYPED_TEST(Rows, BoxesAreThoseOfTheSampledSurface) {
   EXPECT_LT((found - boxes.box).cwiseAbs().maxCoeff(), 1e-6);
 }
 
+TYPED_TEST(Rows, JacobiansOfBoxesAreWhatPerturbationsShow) {
+  constexpr int k = TypeParam::kTangentSize, kParameters = k + kLandmarkSize;
+  constexpr double kStep = 1e-6;
+  const Scene scene = MakeScene<TypeParam>();
+  const BoxTable& of = scene.graph.boxes;
+  const RowMatrix poses = scene.truth.poses(of.pose, Eigen::all);
+  const RowMatrix ellipsoids = scene.truth.landmarks(of.object, Eigen::all);
+  const Camera& camera = scene.graph.camera;
+  const auto [boxes, in_front, jacobians] =
+      DifferentiateBoxesRows(TypeParam::kModel, camera, poses, ellipsoids);
+  EXPECT_EQ(boxes, ProjectToBoxesRows(TypeParam::kModel, camera, poses, ellipsoids).first);
+  ASSERT_TRUE(in_front.all());
+  for (int column = 0; column < kParameters; ++column) {
+    const auto moved = [&](double step) {
+      RowMatrix change = RowMatrix::Zero(of.size(), kParameters);
+      change.col(column).setConstant(step);
+      return ProjectToBoxesRows(TypeParam::kModel,
+                                camera,
+                                PlusRows(TypeParam::kModel, poses, change.leftCols(k)),
+                                ellipsoids + change.rightCols(kLandmarkSize))
+          .first;
+    };
+    const RowMatrix expected = (moved(kStep) - moved(-kStep)) / (2 * kStep);
+    const RowMatrix found =
+        jacobians.col(column).reshaped<Eigen::RowMajor>(of.size(), Eigen::fix<kBoxSize>);
+    EXPECT_LT((found - expected).cwiseAbs().maxCoeff(), 1e-3) << "column " << column;
+  }
+}
+
+TEST(Shapes, AreThoseOfBothModels) {
+  RowMatrix ellipsoids(2, kLandmarkSize);
+  ellipsoids << 1, 2, 3, std::log(2.0), std::log(3.0), std::log(4.0), 0, 0, 0,  //
+      4, 5, 6, 0, 0, 0, 0.5, 0, 0;
+  RowMatrix expected(6, 3);
+  expected << 4, 0, 0, 0, 9, 0, 0, 0, 16, 1, 0.5, 0, 0.5, 1.25, 0, 0, 0, 1;
+  EXPECT_LT((EllipsoidShapeRows(ellipsoids) - expected).norm(), 1e-14);
+  RowMatrix quadrics(2, kLandmarkSize);
+  for (const int row : {0, 1}) {
+    quadrics.row(row) = DualQuadricFromEllipsoid(ellipsoids.row(row).transpose());
+  }
+  EXPECT_LT((DualQuadricShapeRows(quadrics) - expected).norm(), 1e-13);
+  quadrics.row(1) << 1, 0, 0, 0, 1, 0, 0, 1, 0;  // Q* = I: no ellipsoid, S = -I
+  EXPECT_EQ(DualQuadricShapeRows(quadrics).bottomRows<3>(), -Eigen::Matrix3d::Identity());
+}
+
 TEST(ProjectToBoxesRows, IsNanWhereTheObjectIsNotStrictlyInFront) {
   RowMatrix poses = RowMatrix::Zero(3, 3), ellipsoids(3, kLandmarkSize);
   ellipsoids.row(0) = Sphere({0, 5, 0}, 0.5);   // the camera looks left: in front
@@ -103,6 +155,16 @@ TEST(ProjectToBoxesRows, IsNanWhereTheObjectIsNotStrictlyInFront) {
     EXPECT_FALSE(in_front[row]);
     EXPECT_TRUE(boxes.row(row).array().isNaN().all());
   }
+  const auto [same, also_in_front, jacobians] =
+      DifferentiateBoxesRows(PoseModel::kSe2, SceneCamera(), poses, ellipsoids);
+  EXPECT_TRUE((also_in_front == in_front).all());
+  EXPECT_EQ(same.row(0), boxes.row(0));
+  EXPECT_TRUE(jacobians.topRows<4>().allFinite());
+  EXPECT_TRUE(jacobians.bottomRows<8>().array().isNaN().all());
+  const RowMatrix outlines =
+      ProjectToOutlinesRows(PoseModel::kSe2, SceneCamera(), poses, ellipsoids, 5);
+  EXPECT_TRUE(outlines.topRows<5>().allFinite());
+  EXPECT_TRUE(outlines.bottomRows<10>().array().isNaN().all());
 }
 
 void ExpectShapeError(const std::string& message, const std::function<void()>& call) {
@@ -147,6 +209,15 @@ TEST(RowShapes, NameTheTableOfTheWrongShape) {
                    [&] { WorldFromCameraRows(se3, camera, two); });
   ExpectShapeError("ellipsoids has shape (2, 3), expected (2, 9)",
                    [&] { ProjectToBoxesRows(se2, camera, two, two); });
+  ExpectShapeError("ellipsoids has shape (2, 3), expected (2, 9)",
+                   [&] { DifferentiateBoxesRows(se2, camera, two, two); });
+  ExpectShapeError("poses has shape (2, 7), expected (2, 3)",
+                   [&] { ProjectToOutlinesRows(se2, camera, wide, wide, 9); });
+  ExpectShapeError("points: an outline needs at least 2",
+                   [&] { ProjectToOutlinesRows(se2, camera, two, two, 1); });
+  ExpectShapeError("a_from_b has shape (2, 3), expected (2, 7)", [&] { AdjointRows(se3, two); });
+  ExpectShapeError("quadrics has shape (2, 7), expected (2, 9)",
+                   [&] { DualQuadricShapeRows(wide); });
 }
 
 }  // namespace

@@ -95,6 +95,29 @@ TEST(UndistortBoxes, IsExactlyTheIdentityWithoutDistortion) {
   EXPECT_EQ(MakeCamera().UndistortBoxes(box), box);
 }
 
+TEST(UndistortBoxes, NamesTheBoxBehindTheFoldOfTheDistortion) {
+  Camera camera = MakeCamera();
+  camera.distortion[0] = -0.3;
+  RowMatrix boxes(2, 4);
+  boxes << 300, 200, 340, 280, 300, 200, 320 + 500 * 0.9, 280;
+  try {
+    camera.UndistortBoxes(boxes);
+    FAIL() << "no exception";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_THAT(error.what(), HasSubstr("boxes row 1: the distortion cannot be inverted"));
+  }
+}
+
+TEST(DistortBoxes, InvertsUndistortBoxes) {
+  const Camera camera = DistortedCamera();
+  RowMatrix boxes(3, 4);
+  boxes << 10, 20, 100, 220, 300, 200, 420, 470, -0.5, 5, 639.5, 90;
+  const RowMatrix undistorted = camera.UndistortBoxes(boxes);
+  EXPECT_GT((undistorted - boxes).cwiseAbs().maxCoeff(), 10);
+  EXPECT_LT((camera.DistortBoxes(undistorted) - boxes).cwiseAbs().maxCoeff(), 1e-3);
+  EXPECT_EQ(MakeCamera().DistortBoxes(boxes), boxes);
+}
+
 TEST(LocateCamera, MountByHand) {
   Camera camera = MakeCamera();  // half a meter ahead, turned left by 90 degrees on a robot ...
   camera.robot_from_camera << 0.5, 0, 0.2, 0, 0, std::sqrt(0.5), std::sqrt(0.5);

@@ -189,6 +189,37 @@ TEST(LogRotation, InvertsExpAtAllAngles) {
   }
 }
 
+// a_from_b o Exp(x) = Exp(A x) o a_from_b, to first order.
+TYPED_TEST(PoseModels, AdjointCarriesSmallMotionsOver) {
+  for (int trial = 0; trial < kTrials; ++trial) {
+    const auto pose = this->Random();
+    const auto tangent = (1e-6 * this->RandomTangent(1)).eval();
+    const auto moved = (Adjoint<TypeParam>(pose.data()) * tangent).eval();
+    const auto after = this->Plus(pose, tangent);
+    const auto before = this->Compose(this->Plus(this->Identity(), moved), pose);
+    EXPECT_LT(this->Minus(after, before).norm(), 1e-10);
+  }
+}
+
+TYPED_TEST(PoseModels, AdjointOfAProductIsTheProduct) {
+  for (int trial = 0; trial < kTrials; ++trial) {
+    const auto a = this->Random(), b = this->Random();
+    const auto product = this->Compose(a, b);
+    EXPECT_LT((Adjoint<TypeParam>(product.data()) -
+               Adjoint<TypeParam>(a.data()) * Adjoint<TypeParam>(b.data()))
+                  .norm(),
+              1e-12);
+  }
+}
+
+// A turn in the frame of b, 2 m ahead and looking left, moves a sideways.
+TEST(Adjoint, InThePlaneByHand) {
+  const double a_from_b[] = {2, 0, M_PI / 2};
+  Eigen::Matrix3d expected;
+  expected << 0, -1, 0, 1, 0, -2, 0, 0, 1;
+  EXPECT_LT((Adjoint<Se2>(a_from_b) - expected).norm(), 1e-15);
+}
+
 TEST(LogRotation, HalfATurnHasNormPi) {
   const Vector3<double> log = LogRotation(Eigen::Quaterniond(0, 0.6, 0, 0.8));
   EXPECT_LT((log - M_PI * Vector3<double>(0.6, 0, 0.8)).norm(), 1e-15);

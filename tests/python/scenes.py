@@ -106,8 +106,24 @@ def film(poses, things, *, noise=None, noise_px=1.0, missed=0.0, false_positives
 def outline(pose, center, semi_axes, turn):
     """Return the box of an ellipsoid seen from a pose (7,), None unless wholly in the image.
 
-    The image of the dual quadric Q is the dual conic P Q P^T, whose tangents at u = const. are
-    (1, 0, -u): a quadratic equation.
+    Tangents of the dual conic at u = const. are (1, 0, -u): a quadratic equation.
+    """
+    conic = dual_conic(pose, center, semi_axes, turn)
+    if conic is None:
+        return None
+    edges = np.empty(4)
+    for axis in (0, 1):
+        middle = conic[axis, 2]
+        half = np.sqrt(middle**2 - conic[axis, axis])
+        edges[axis], edges[axis + 2] = middle - half, middle + half
+    inside = (edges[:2] > 4).all() and (edges[2:] < [CAMERA.width - 5, CAMERA.height - 5]).all()
+    return edges if inside else None
+
+
+def dual_conic(pose, center, semi_axes, turn):
+    """Return the image (3, 3) of an ellipsoid from a pose (7,), None unless it is in front.
+
+    The image of the dual quadric Q is the dual conic P Q P^T, here [c c^T - E, c; c^T, 1].
     """
     rotation = Rotation.from_quat(pose[3:]).as_matrix()
     seen = rotation.T @ (center - pose[:3])
@@ -116,13 +132,40 @@ def outline(pose, center, semi_axes, turn):
         return None
     k = np.array([[CAMERA.fx, 0, CAMERA.cx], [0, CAMERA.fy, CAMERA.cy], [0, 0, 1]])
     conic = k @ (shape @ shape.T - np.outer(seen, seen)) @ k.T
-    edges = np.empty(4)
-    for axis in (0, 1):
-        middle = conic[axis, 2] / conic[2, 2]
-        half = np.sqrt(middle**2 - conic[axis, axis] / conic[2, 2])
-        edges[axis], edges[axis + 2] = middle - half, middle + half
-    inside = (edges[:2] > 4).all() and (edges[2:] < [CAMERA.width - 5, CAMERA.height - 5]).all()
-    return edges if inside else None
+    return conic / conic[2, 2]
+
+
+def cut_by_the_border():
+    """Return a recording of a pose with a perfect box of each of four objects, (4, 9), and these.
+
+    They are 5 m away, ever further to the right: the border of the image cuts them, and the
+    detector bounds what it sees. The highest point of the first is in the image, of no other.
+    """
+    border, semi_axes = CAMERA.width - 0.5, np.array([0.5, 0.3, 0.4])
+    here = np.eye(7)[6]
+    boxes, ellipsoids = [], []
+    for x in (2.9, 3.2, 3.4, 3.6):
+        turn = Rotation.from_euler("y", x)
+        center = np.array([x, 0.2, 5.0])
+        conic = dual_conic(here, center, semi_axes, turn.as_matrix())
+        middle = conic[:2, 2]
+        root = np.linalg.cholesky(np.outer(middle, middle) - conic[:2, :2])
+        angle = np.linspace(0.0, 2.0 * np.pi, 200_000)
+        points = middle + np.column_stack([np.cos(angle), np.sin(angle)]) @ root.T
+        seen = points[points[:, 0] <= border]
+        boxes.append([*seen.min(axis=0), border, seen[:, 1].max()])
+        ellipsoids.append(_core.ellipsoid_from_axes(center, semi_axes, turn.as_quat()))
+    detections = Detections(
+        pose=np.zeros(4, dtype=int),
+        box=np.array(boxes),
+        score=np.ones(4),
+        class_id=np.ones(4, dtype=int),
+        object_id=np.arange(4),
+        class_names=NAMES,
+        truncated=np.tile([False, False, True, False], (4, 1)),
+    )
+    odometry = Odometry(PoseModel.SE3, here, np.zeros((0, 7)), np.zeros((0, 6, 6)))
+    return Recording(CAMERA, np.zeros(1), odometry, detections), np.array(ellipsoids)
 
 
 def map_truly(made, labels=None, *, step_noise=None):

@@ -1,15 +1,16 @@
-from dataclasses import replace
 from itertools import product
 
 import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from dqslam import Detections, PoseModel, _core
-from dqslam.association import CHI2_GATE, box_chi2
+from dqslam import PoseModel, _core
+from dqslam.association import CHI2_GATE
 from dqslam.association.assignment import assign
 from dqslam.association.gating import GATE, PredictedBoxes, pair_costs, predict_boxes
-from scenes import CAMERA, outline
+from dqslam.association.scene_map import SceneMap
+from dqslam.assumptions import BoxNoise
+from scenes import CAMERA, cut_by_the_border, outline
 
 POSE = np.array([0.2, -0.1, 0.3, 0.0, 0.0, np.sin(0.1), np.cos(0.1)])
 SIGMAS = np.concatenate([np.full(3, 0.02), np.full(3, 0.004), np.full(3, 0.05), np.full(6, 0.03)])
@@ -83,7 +84,10 @@ def test_gates_are_those_of_chi_square():
 
 def test_a_cost_by_hand():
     predicted = PredictedBoxes(
-        np.array([0]), np.array([[100.0, 100.0, 140.0, 160.0]]), np.diag([5.0, 5.0, 7.0, 7.0])[None]
+        object_row=np.array([0]),
+        box=np.array([[100.0, 100.0, 140.0, 160.0]]),
+        covariance=np.diag([5.0, 5.0, 7.0, 7.0])[None],
+        out_of_sight=np.zeros((1, 4), dtype=bool),
     )
     cost = costs(predicted, [103.0, 100.0, 140.0, 156.0], probability=0.5)
     d2 = 3.0**2 / 9.0 + 4.0**2 / 16.0
@@ -140,19 +144,43 @@ def test_what_nearly_touches_the_camera_is_not_predicted():
         assert 1 in found.object_row
 
 
-def test_box_chi2_with_edges_that_the_image_cut():
-    """A cut edge fits when the object reaches it: then, only the others count."""
-    place = ellipsoid([0, 0, 4])
-    box, _ = _core.project_to_boxes(PoseModel.SE3, CAMERA, np.eye(7)[6:], place[None])
-    cut = np.array([[False, False, True, False]])
-    for inwards, expected in ((6.0, 1.0), (-6.0, 1.0 + 36.0 / 9.0)):
-        seen = Detections(
-            [0], box + [2.0, 0.0, -inwards, 0.0], [1.0], [1], [0], {1: "cup"}, truncated=cut
-        )
-        args = (CAMERA, PoseModel.SE3, np.eye(7)[6:], place[None])
-        assert box_chi2(*args, seen, BOX_COVARIANCE[None])[0] == pytest.approx(expected)
-        whole = replace(seen, truncated=np.zeros((1, 4), dtype=bool))
-        assert box_chi2(*args, whole, BOX_COVARIANCE[None])[0] == pytest.approx(1.0 + 4.0)
+def test_a_perfect_estimate_fits_its_boxes_where_the_border_cuts_them():
+    """Top and bottom are where the border cuts the object, not where it is highest."""
+    recording, ellipsoids = cut_by_the_border()
+    rows = np.arange(4)
+    scene = SceneMap(recording, rows, box_noise=BoxNoise())
+    np.testing.assert_allclose(scene.chi2(rows, ellipsoids, blur=0.0), 0.0, atol=1e-4)
+    # Not all goes: an object half as large again sticks out to the left, at least.
+    larger = ellipsoids + np.r_[0, 0, 0, np.log([1.5] * 3), 0, 0, 0]
+    assert (scene.chi2(rows, larger, blur=0.0) > 2.0).all()
+
+
+def test_what_the_object_touches_outside_the_image_drops_out_too():
+    """Where it reaches that far, and on boxes that the image cut."""
+    recording, ellipsoids = cut_by_the_border()
+    boxes = recording.detections
+    here = recording.odometry.first_pose
+    found = predict_boxes(recording.camera, PoseModel.SE3, here, ellipsoids, joint_covariance(4))
+    np.testing.assert_array_equal(found.object_row, np.arange(4))
+    expected = np.zeros((4, 4), dtype=bool)
+    expected[:, 2] = expected[1:, 1] = expected[1:, 3] = True
+    np.testing.assert_array_equal(found.out_of_sight, expected)
+    table = costs(found, boxes.box, boxes.truncated)
+    for row in range(4):
+        kept = np.flatnonzero(~expected[row])
+        spread = (found.covariance[row] + BOX_COVARIANCE)[np.ix_(kept, kept)]
+        # d^2 is zero; what is not compared is as likely as if the box showed something else.
+        same = table.null[row] * (1.0 - len(kept) / 3.0)
+        log_det = np.linalg.slogdet(2 * np.pi * spread)[1]
+        assert table.cost[row, row] == pytest.approx(log_det + same, abs=1e-4)
+    # An object that ends inside is too low: that counts.
+    sunk = np.array([0.0, -40.0, 0.0, 0.0])
+    assert (
+        (costs(found, boxes.box + sunk, boxes.truncated).cost > table.cost + 1.0).diagonal().all()
+    )
+    # And where no border cut the box, all edges do.
+    whole = costs(found, boxes.box)
+    assert np.isinf(whole.cost[3, 3])
 
 
 # --- assignment

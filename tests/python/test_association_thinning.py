@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from dqslam import Detections, Odometry, PoseModel, Recording, _core
-from dqslam.association.thinning import compose_covariance, fill_in, thin_recording, transport
+from dqslam.association.thinning import compose_covariance, fill_in, thin_recording
 from scenes import CAMERA
 
 MODELS = [PoseModel.SE2, PoseModel.SE3]
@@ -39,20 +39,6 @@ def winding(model, count, seed=0):
 def dead_reckoned(recording):
     odometry = recording.odometry
     return _core.dead_reckon(odometry.pose_model, odometry.first_pose, odometry.relative)
-
-
-@pytest.mark.parametrize("model", MODELS)
-def test_transport_is_the_derivative_of_a_composition(model):
-    poses, relative = winding(model, 20), winding(model, 20, seed=1)
-    after = _core.compose(model, poses, relative)
-    matrix = transport(model, relative)
-    step = 1e-6
-    for axis in range(TANGENT[model]):
-        tangent = np.zeros((20, TANGENT[model]))
-        tangent[:, axis] = step
-        moved = _core.compose(model, _core.plus(model, poses, tangent), relative)
-        derivative = _core.minus(model, moved, after) / step
-        np.testing.assert_allclose(matrix[:, :, axis], derivative, atol=1e-5)
 
 
 def test_noise_of_a_straight_path_by_hand():

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from dqslam import _core
-from dqslam.metrics import boxes_through_lens, project_outlines, through_lens
+from dqslam.metrics import through_lens, visible_outlines
 from oracle import ellipsoid_surface, se3_matrix, to_pixels
 
 CAMERA = _core.Camera(500.0, 510.0, 321.0, 239.0, 640, 480)
@@ -22,6 +22,10 @@ TURNS = Rotation.random(COUNT, random_state=2).as_quat()
 ELLIPSOIDS = np.array(
     [_core.ellipsoid_from_axes(*one) for one in zip(CENTERS, AXES, TURNS, strict=True)]
 )
+
+
+def project_outlines(camera, poses, ellipsoids, **options):
+    return _core.project_to_outlines(_core.PoseModel.SE3, camera, poses, ellipsoids, **options)
 
 
 def test_each_side_of_the_box_touches_the_outline():
@@ -73,6 +77,18 @@ def test_what_is_behind_or_around_the_camera_has_no_outline(depth):
     assert project_outlines(CAMERA, pose[:0], rows[:0]).shape == (0, 128, 2)
 
 
+def test_what_the_image_shows_comes_from_far_to_near():
+    places = [[0, 0, 4], [0, 0, -4], [0.5, 0, 9], [9, 0, 4], [-1, 0, 6]]
+    ellipsoids = [_core.ellipsoid_from_axes(place, [0.3] * 3, [0, 0, 0, 1]) for place in places]
+    rows, outlines = visible_outlines(CAMERA, np.eye(7)[6], np.array([*ellipsoids, [np.nan] * 9]))
+    np.testing.assert_array_equal(rows, [2, 4, 0])
+    here = np.tile(np.eye(7)[6], (3, 1))
+    expected = project_outlines(CAMERA, here, np.array(ellipsoids)[rows])
+    np.testing.assert_array_equal(outlines, expected)
+    rows, outlines = visible_outlines(CAMERA, np.eye(7)[6], np.zeros((0, 9)), points=7)
+    assert (rows.shape, outlines.shape) == ((0,), (0, 7, 2))
+
+
 def test_the_lens_bends_what_the_image_shows_and_nothing_far_from_it():
     lens = _core.Camera(
         520, 521, 325, 249, 640, 480, distortion=[0.231, -0.785, -0.003, -0.0001, 0.917]
@@ -84,14 +100,3 @@ def test_the_lens_bends_what_the_image_shows_and_nothing_far_from_it():
     assert not np.allclose(bent[0, 1], points[0, 1], atol=0.5)
     assert np.isnan(bent[0, 2:]).all()
     np.testing.assert_array_equal(through_lens(CAMERA, points), points)
-
-
-def test_boxes_come_back_through_the_lens():
-    lens = _core.Camera(
-        520, 521, 325, 249, 640, 480, distortion=[0.231, -0.785, -0.003, -0.0001, 0.917]
-    )
-    boxes = np.array([[10.0, 20, 100, 220], [300, 200, 420, 470], [500, 5, 630, 90]])
-    back = boxes_through_lens(lens, lens.undistort_boxes(boxes))
-    np.testing.assert_allclose(back, boxes, atol=0.2)
-    assert np.abs(lens.undistort_boxes(boxes) - boxes).max() > 1.0
-    np.testing.assert_array_equal(boxes_through_lens(CAMERA, boxes), boxes)

@@ -8,12 +8,14 @@ import pytest
 
 from dqslam import _core
 from dqslam.assumptions import BoxNoise, SizePrior
+from dqslam.estimate import Estimate
 from dqslam.graph import build_graph, solve
 from dqslam.io import load_recording
 from dqslam.pipeline import RunOptions, run
 from dqslam.pipeline.border import cut_edges, with_cut_edges
-from dqslam.pipeline.report import box_chi2
+from dqslam.pipeline.report import box_chi2, describe_boxes
 from orbit import CAMERA, NAMES, make_orbit, write_orbit
+from scenes import cut_by_the_border
 
 
 def test_edges_on_the_border_are_told_from_edges_inside():
@@ -50,6 +52,29 @@ def test_a_cut_edge_fits_when_the_object_reaches_it(files):
         cut_chi2 = box_chi2(estimate, replace(whole, truncated=left), noise)
         gone = chi2 - cut_chi2
         assert np.median(gone) == pytest.approx(100.0 if is_reached else 0.0, rel=0.1)
+
+
+def test_a_perfect_estimate_fits_its_boxes_where_the_border_cuts_them():
+    recording, ellipsoids = cut_by_the_border()
+    poses = recording.odometry.first_pose[None]
+    estimate = Estimate(
+        pose_model=_core.PoseModel.SE3,
+        camera=recording.camera,
+        timestamps=recording.timestamps,
+        poses=poses,
+        initial_poses=poses,
+        object_ids=np.arange(4),
+        class_names=("cup",) * 4,
+        observations=np.ones(4, dtype=int),
+        dual_quadrics=np.array([_core.dual_quadric_from_ellipsoid(one) for one in ellipsoids]),
+        ellipsoids=ellipsoids,
+    )
+    chi2 = box_chi2(estimate, recording.detections, BoxNoise())
+    np.testing.assert_allclose(chi2, 0.0, atol=1e-4)
+    assert describe_boxes(chi2)["outlier_share"] == 0.0
+    # What no border cut must end at all edges where the object ends.
+    whole = replace(recording.detections, truncated=np.zeros((4, 4), dtype=bool))
+    assert (box_chi2(estimate, whole, BoxNoise()) > 13.28).all()
 
 
 def test_boxes_cut_by_the_image_do_not_bend_the_map(tmp_path):

@@ -7,6 +7,7 @@
 
 #include <Eigen/Cholesky>
 #include <stdexcept>
+#include <string>
 
 #include "dqslam/geometry/blocks.h"
 
@@ -32,6 +33,19 @@ Eigen::Matrix<double, kSize, kSize> SqrtInformation(
   }
   const Square scale = information.asDiagonal();
   return L.template triangularView<Eigen::Lower>().solve(scale);
+}
+
+/// The same of one row of a table of covariances, (n, k * k); the exception names both.
+template <int kSize>
+Eigen::Matrix<double, kSize, kSize> SqrtInformationOfRow(const std::string& table,
+                                                         const RowMatrix& covariances,
+                                                         Eigen::Index row) {
+  using Square = Eigen::Matrix<double, kSize, kSize, Eigen::RowMajor>;
+  try {
+    return SqrtInformation<kSize>(Eigen::Map<const Square>(covariances.row(row).data()));
+  } catch (const std::invalid_argument& error) {
+    throw std::invalid_argument(table + " row " + std::to_string(row) + ": " + error.what());
+  }
 }
 
 /// residual = W error, for AutoDiff scalars.

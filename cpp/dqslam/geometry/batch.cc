@@ -1,22 +1,44 @@
 #include "dqslam/geometry/batch.h"
 
 #include <limits>
-#include <stdexcept>
-#include <string>
 
+#include "dqslam/geometry/box_derivatives.h"
 #include "dqslam/geometry/dispatch.h"
+#include "dqslam/geometry/outline.h"
 
 namespace dqslam {
 namespace {
 
-void RequireShape(const char* name,
-                  const RowMatrix& table,
-                  Eigen::Index rows,
-                  Eigen::Index columns) {
-  if (table.rows() == rows && table.cols() == columns) return;
-  throw std::invalid_argument(std::string(name) + " has shape (" + std::to_string(table.rows()) +
-                              ", " + std::to_string(table.cols()) + "), expected (" +
-                              std::to_string(rows) + ", " + std::to_string(columns) + ")");
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+template <typename Landmark>
+RowMatrix ShapeRows(const char* name, const RowMatrix& landmarks) {
+  RequireShape(name, landmarks, landmarks.rows(), kLandmarkSize);
+  RowMatrix shapes(3 * landmarks.rows(), 3);
+  for (Eigen::Index i = 0; i < landmarks.rows(); ++i) {
+    shapes.middleRows<3>(3 * i) = Landmark::Unpack(landmarks.row(i).data()).shape;
+  }
+  return shapes;
+}
+
+// Calls visit(i, surface) with each ellipsoid as its pose's camera has it.
+template <typename Visit>
+void ForEachInCamera(PoseModel model,
+                     const Camera& camera,
+                     const RowMatrix& poses,
+                     const RowMatrix& ellipsoids,
+                     const Visit& visit) {
+  Dispatch(model, [&](auto pose) {
+    using Pose = decltype(pose);
+    RequireShape("poses", poses, poses.rows(), Pose::kSize);
+    RequireShape("ellipsoids", ellipsoids, poses.rows(), kLandmarkSize);
+    const Mount mount(camera);
+    for (Eigen::Index i = 0; i < poses.rows(); ++i) {
+      visit(i,
+            ToCamera(LocateCamera<Pose>(poses.row(i).data(), mount),
+                     EllipsoidModel::Unpack(ellipsoids.row(i).data())));
+    }
+  });
 }
 
 }  // namespace
@@ -46,6 +68,29 @@ RowMatrix BetweenRows(PoseModel model, const RowMatrix& a, const RowMatrix& b) {
       Pose::Normalize(result.row(i).data());
     }
     return result;
+  });
+}
+
+RowMatrix InverseRows(PoseModel model, const RowMatrix& a_from_b) {
+  return Dispatch(model, [&](auto pose) {
+    using Pose = decltype(pose);
+    const double still[Pose::kTangentSize] = {};
+    Eigen::Matrix<double, 1, Pose::kSize> identity;
+    Pose::FromTangent(still, identity.data());
+    return BetweenRows(model, a_from_b, identity.replicate(a_from_b.rows(), 1));
+  });
+}
+
+RowMatrix AdjointRows(PoseModel model, const RowMatrix& a_from_b) {
+  return Dispatch(model, [&](auto pose) {
+    using Pose = decltype(pose);
+    constexpr int k = Pose::kTangentSize;
+    RequireShape("a_from_b", a_from_b, a_from_b.rows(), Pose::kSize);
+    RowMatrix adjoints(k * a_from_b.rows(), k);
+    for (Eigen::Index i = 0; i < a_from_b.rows(); ++i) {
+      adjoints.middleRows<k>(k * i) = Adjoint<Pose>(a_from_b.row(i).data());
+    }
+    return adjoints;
   });
 }
 
@@ -110,24 +155,82 @@ std::pair<RowMatrix, Mask> ProjectToBoxesRows(PoseModel model,
                                               const Camera& camera,
                                               const RowMatrix& poses,
                                               const RowMatrix& ellipsoids) {
+  RowMatrix boxes = RowMatrix::Constant(poses.rows(), kBoxSize, kNan);
+  Mask in_front(poses.rows());
+  ForEachInCamera(model, camera, poses, ellipsoids, [&](Eigen::Index i, const auto& surface) {
+    Eigen::Vector4d box;
+    in_front[i] = ProjectToBox(surface, camera, &box);
+    if (in_front[i]) boxes.row(i) = box;
+  });
+  return {boxes, in_front};
+}
+
+BoolTable EdgesOutOfSightRows(PoseModel model,
+                              const Camera& camera,
+                              const RowMatrix& poses,
+                              const RowMatrix& ellipsoids) {
+  BoolTable out_of_sight = BoolTable::Constant(poses.rows(), kBoxSize, true);
+  ForEachInCamera(model, camera, poses, ellipsoids, [&](Eigen::Index i, const auto& surface) {
+    Eigen::Vector4d box;
+    if (!ProjectToBox(surface, camera, &box)) return;
+    const EdgeFlags flags = EdgesOutOfSight(surface, camera, box);
+    out_of_sight.block<1, kBoxSize>(i, 0) = flags.transpose();
+  });
+  return out_of_sight;
+}
+
+std::tuple<RowMatrix, Mask, RowMatrix> DifferentiateBoxesRows(PoseModel model,
+                                                              const Camera& camera,
+                                                              const RowMatrix& poses,
+                                                              const RowMatrix& ellipsoids) {
   return Dispatch(model, [&](auto pose) {
     using Pose = decltype(pose);
+    constexpr int k = Pose::kTangentSize;
     RequireShape("poses", poses, poses.rows(), Pose::kSize);
     RequireShape("ellipsoids", ellipsoids, poses.rows(), kLandmarkSize);
-    RowMatrix boxes(poses.rows(), kBoxSize);
+    RowMatrix boxes = RowMatrix::Constant(poses.rows(), kBoxSize, kNan);
+    RowMatrix jacobians = RowMatrix::Constant(kBoxSize * poses.rows(), k + kLandmarkSize, kNan);
     Mask in_front(poses.rows());
     const Mount mount(camera);
     for (Eigen::Index i = 0; i < poses.rows(); ++i) {
+      const Station station = Station::At<Pose>(poses.row(i).data(), mount);
+      const Unpacked<EllipsoidModel> ellipsoid(ellipsoids.row(i).data());
       Eigen::Vector4d box;
-      in_front[i] = ProjectToBox(ToCamera(LocateCamera<Pose>(poses.row(i).data(), mount),
-                                          EllipsoidModel::Unpack(ellipsoids.row(i).data())),
-                                 camera,
-                                 &box);
-      if (!in_front[i]) box.setConstant(std::numeric_limits<double>::quiet_NaN());
+      EdgeDerivatives edges;
+      in_front[i] =
+          DifferentiateBox(ToCamera(station.camera, ellipsoid.surface), camera, &box, &edges);
+      if (!in_front[i]) continue;
+      Eigen::Matrix<double, kBoxSize, k> by_pose;
+      Eigen::Matrix<double, kBoxSize, kLandmarkSize> by_ellipsoid;
+      ByPoseAndLandmark<Pose>(edges, station, mount, ellipsoid, &by_pose, &by_ellipsoid);
       boxes.row(i) = box;
+      jacobians.middleRows<kBoxSize>(kBoxSize * i) << by_pose, by_ellipsoid;
     }
-    return std::make_pair(boxes, in_front);
+    return std::make_tuple(boxes, in_front, jacobians);
   });
+}
+
+RowMatrix ProjectToOutlinesRows(PoseModel model,
+                                const Camera& camera,
+                                const RowMatrix& poses,
+                                const RowMatrix& ellipsoids,
+                                int points) {
+  if (points < 2) throw std::invalid_argument("points: an outline needs at least 2");
+  RowMatrix outlines = RowMatrix::Constant(points * poses.rows(), 2, kNan);
+  ForEachInCamera(model, camera, poses, ellipsoids, [&](Eigen::Index i, const auto& surface) {
+    RowMatrix outline;
+    if (!ProjectToOutline(surface, camera, points, &outline)) return;
+    outlines.middleRows(points * i, points) = outline;
+  });
+  return outlines;
+}
+
+RowMatrix EllipsoidShapeRows(const RowMatrix& ellipsoids) {
+  return ShapeRows<EllipsoidModel>("ellipsoids", ellipsoids);
+}
+
+RowMatrix DualQuadricShapeRows(const RowMatrix& quadrics) {
+  return ShapeRows<DualQuadricModel>("quadrics", quadrics);
 }
 
 }  // namespace dqslam

@@ -35,6 +35,44 @@ bool Undistort(const Eigen::Matrix<double, 5, 1>& d, const Vector2d& distorted, 
   return false;
 }
 
+// `each` successive points belong to one row of the table, which the exception names.
+RowMatrix UndistortAll(const Camera& camera,
+                       const RowMatrix& distorted,
+                       const std::string& table,
+                       Eigen::Index each) {
+  if (!camera.HasDistortion()) return distorted;
+  RowMatrix points(distorted.rows(), 2);
+  for (Eigen::Index i = 0; i < distorted.rows(); ++i) {
+    const Vector2d normalized((distorted(i, 0) - camera.cx) / camera.fx,
+                              (distorted(i, 1) - camera.cy) / camera.fy);
+    Vector2d point;
+    if (!Undistort(camera.distortion, normalized, &point)) {
+      throw std::invalid_argument(table + " row " + std::to_string(i / each) +
+                                  ": the distortion cannot be inverted there");
+    }
+    points.row(i) << camera.fx * point.x() + camera.cx, camera.fy * point.y() + camera.cy;
+  }
+  return points;
+}
+
+// Middles of the edges of boxes (n, 4), (4 n, 2).
+RowMatrix MiddlesOfEdges(const RowMatrix& boxes) {
+  RowMatrix middles(4 * boxes.rows(), 2);
+  for (Eigen::Index i = 0; i < boxes.rows(); ++i) {
+    const auto box = boxes.row(i);
+    const double u = 0.5 * (box[0] + box[2]), v = 0.5 * (box[1] + box[3]);
+    middles.middleRows<4>(4 * i) << box[0], v, u, box[1], box[2], v, u, box[3];
+  }
+  return middles;
+}
+
+// Boxes (n, 4) whose edges run through points (4 n, 2).
+RowMatrix FromMiddles(const RowMatrix& points) {
+  RowMatrix boxes(points.rows() / 4, 4);
+  for (Eigen::Index i = 0; i < points.rows(); ++i) boxes(i / 4, i % 4) = points(i, i % 2);
+  return boxes;
+}
+
 }  // namespace
 
 void Camera::Validate() const {
@@ -52,18 +90,7 @@ void Camera::Validate() const {
 }
 
 RowMatrix Camera::UndistortPoints(const RowMatrix& distorted) const {
-  if (!HasDistortion()) return distorted;
-  RowMatrix points(distorted.rows(), 2);
-  for (Eigen::Index i = 0; i < distorted.rows(); ++i) {
-    const Vector2d normalized((distorted(i, 0) - cx) / fx, (distorted(i, 1) - cy) / fy);
-    Vector2d point;
-    if (!Undistort(distortion, normalized, &point)) {
-      throw std::invalid_argument("points row " + std::to_string(i) +
-                                  ": the distortion cannot be inverted there");
-    }
-    points.row(i) << fx * point.x() + cx, fy * point.y() + cy;
-  }
-  return points;
+  return UndistortAll(*this, distorted, "points", 1);
 }
 
 RowMatrix Camera::DistortPoints(const RowMatrix& undistorted) const {
@@ -79,15 +106,14 @@ RowMatrix Camera::DistortPoints(const RowMatrix& undistorted) const {
 
 RowMatrix Camera::UndistortBoxes(const RowMatrix& distorted) const {
   if (!HasDistortion()) return distorted;
-  RowMatrix boxes(distorted.rows(), 4);
-  for (Eigen::Index i = 0; i < distorted.rows(); ++i) {
-    const auto box = distorted.row(i);
-    const double u = 0.5 * (box[0] + box[2]), v = 0.5 * (box[1] + box[3]);
-    RowMatrix middles(4, 2);
-    middles << box[0], v, u, box[1], box[2], v, u, box[3];
-    const RowMatrix points = UndistortPoints(middles);
-    boxes.row(i) << points(0, 0), points(1, 1), points(2, 0), points(3, 1);
-  }
+  return FromMiddles(UndistortAll(*this, MiddlesOfEdges(distorted), "boxes", 4));
+}
+
+RowMatrix Camera::DistortBoxes(const RowMatrix& undistorted) const {
+  if (!HasDistortion()) return undistorted;
+  RowMatrix boxes = FromMiddles(DistortPoints(MiddlesOfEdges(undistorted)));
+  // An edge is undistorted at the middle of the recorded box, which is not that of the other.
+  for (int iteration = 0; iteration < 5; ++iteration) boxes += undistorted - UndistortBoxes(boxes);
   return boxes;
 }
 

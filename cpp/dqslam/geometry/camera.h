@@ -35,6 +35,8 @@ struct Camera {
   RowMatrix DistortPoints(const RowMatrix& undistorted) const;
   /// Boxes, shape (n, 4): each edge is undistorted at its middle, where objects usually touch it.
   RowMatrix UndistortBoxes(const RowMatrix& distorted) const;
+  /// Boxes as recorded, shape (n, 4): inverts UndistortBoxes, to a small part of a pixel.
+  RowMatrix DistortBoxes(const RowMatrix& undistorted) const;
 };
 
 /// Where a camera stands: what every cost needs of a pose.

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "dqslam/geometry/outline.h"
+
 namespace dqslam {
 
 double TangentDepth(const Surface<double>& in_camera) {
@@ -37,13 +39,8 @@ EdgeFlags OneSidedEdges(const EdgeFlags& truncated,
                         const Camera& camera,
                         const Surface<double>& in_camera,
                         const Eigen::Vector4d& predicted) {
-  EdgeFlags one_sided = truncated;
-  if (!one_sided.any()) return one_sided;
-  const Eigen::Matrix<double, 4, 2> points = TouchingPoints(in_camera, camera, predicted);
-  for (int edge = 0; edge < kBoxSize; ++edge) {
-    one_sided[edge] = one_sided[edge] || !camera.Shows(points(edge, 0), points(edge, 1));
-  }
-  return one_sided;
+  if (!truncated.any()) return truncated;
+  return truncated || EdgesOutOfSight(in_camera, camera, predicted);
 }
 
 Vector9d DualQuadricFromSurface(const Surface<double>& surface) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <array>
 #include <cmath>
 
 #include "dqslam/geometry/blocks.h"
@@ -174,6 +175,24 @@ void Minus(const T* pose, const T* origin, T* tangent) {
   T relative[Pose::kSize];
   Pose::Between(origin, pose, relative);
   Pose::ToTangent(relative, tangent);
+}
+
+/// A with `a_from_b o Exp(x) = Exp(A x) o a_from_b`: turns a small motion in the frame of b into
+/// the same motion in the frame of a.
+template <typename Pose>
+Eigen::Matrix<double, Pose::kTangentSize, Pose::kTangentSize> Adjoint(const double* a_from_b) {
+  const Rigid<double> rigid = Pose::template WorldFromRobot<double>(a_from_b);
+  const Vector3<double>& t = rigid.translation;
+  Matrix3<double> cross;  // cross * v = t x v
+  cross << 0, -t.z(), t.y(), t.z(), 0, -t.x(), -t.y(), t.x(), 0;
+  Eigen::Matrix<double, 6, 6> full;
+  full << rigid.rotation, cross * rigid.rotation, Matrix3<double>::Zero(), rigid.rotation;
+  if constexpr (Pose::kModel == PoseModel::kSe2) {
+    const std::array<int, 3> planar = {0, 1, 5};
+    return full(planar, planar);
+  } else {
+    return full;
+  }
 }
 
 }  // namespace dqslam

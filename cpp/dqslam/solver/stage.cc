@@ -2,10 +2,7 @@
 
 #include <ceres/problem.h>
 
-#include <algorithm>
-#include <cmath>
-#include <limits>
-
+#include "dqslam/costs/box_chi_square.h"
 #include "dqslam/geometry/dispatch.h"
 #include "dqslam/solver/ceres_backend.h"
 #include "dqslam/solver/ceres_problem.h"
@@ -50,15 +47,13 @@ Eigen::VectorXd BoxCosts(const SolveContext& context, const State& state) {
     for (int row = 0; row < graph.boxes.size(); ++row) {
       const double* pose = state.poses.row(graph.boxes.pose[row]).data();
       const double* parameters = state.landmarks.row(graph.boxes.object[row]).data();
-      Eigen::Vector4d predicted;
       const Surface<double> surface =
           ToCamera(LocateCamera<Pose>(pose, context.prepared.mount), Landmark::Unpack(parameters));
-      const bool defined = ProjectToBox(surface, graph.camera, &predicted);
-      Eigen::Vector4d error = predicted - graph.boxes.box.row(row).transpose();
-      IgnoreBeyond(OneSidedEdges(context.prepared, row, surface), &error);
-      costs[row] = defined
-                       ? 0.5 * (context.prepared.box_sqrt_information[row] * error).squaredNorm()
-                       : std::numeric_limits<double>::infinity();
+      costs[row] = 0.5 * BoxChiSquare(surface,
+                                      graph.camera,
+                                      graph.boxes.box.row(row),
+                                      graph.boxes.truncated.row(row),
+                                      context.prepared.box_sqrt_information[row]);
     }
   });
   return costs;

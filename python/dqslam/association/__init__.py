@@ -6,7 +6,6 @@ from dqslam.association.association import Association as Association
 from dqslam.association.association import associate as associate
 from dqslam.association.association import not_found as not_found
 from dqslam.association.gating import CHI2_GATE as CHI2_GATE
-from dqslam.association.gating import box_chi2 as box_chi2
 from dqslam.association.rays import cameras_by_odometry as cameras_by_odometry
 from dqslam.association.rays import cast_rays as cast_rays
 from dqslam.association.thinning import fill_in as fill_in

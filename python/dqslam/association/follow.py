@@ -14,7 +14,6 @@ from dqslam.association.consistency import find_misfits, join_duplicates
 from dqslam.association.gating import CHI2_GATE, PredictedBoxes, in_image, pair_costs, predict_boxes
 from dqslam.association.initiation import MIN_VIEWS, propose_groups
 from dqslam.association.scene_map import SceneMap
-from dqslam.association.thinning import transport
 from dqslam.recording import Recording
 
 # A box waits unless its choice is better than all others by this: -2 ln of the odds, 20 to 1.
@@ -76,8 +75,9 @@ class Follower:
         known, covariance = scene.joint_covariance(begin - 1, _in_view(scene, begin, end))
         odometry = scene.recording.odometry
         k = odometry.covariance.shape[1]
-        for pose in range(begin, end):
-            moved = transport(odometry.pose_model, odometry.relative[pose - 1 : pose])[0]
+        back = _core.inverse(odometry.pose_model, odometry.relative[begin - 1 : end - 1])
+        moves = _core.adjoint(odometry.pose_model, back)
+        for pose, moved in zip(range(begin, end), moves, strict=True):
             covariance[:k] = moved @ covariance[:k]
             covariance[:, :k] = covariance[:, :k] @ moved.T
             covariance[:k, :k] += odometry.covariance[pose - 1]

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dqslam import _core
-from dqslam.recording import Detections
 
 # 99 % of the boxes of an object that is where the map says lie below this, by edges that count.
 CHI2_GATE = np.array([0.0, 6.63, 9.21, 11.34, 13.28])
@@ -17,28 +16,6 @@ CHI2_GATE = np.array([0.0, 6.63, 9.21, 11.34, 13.28])
 GATE = np.array([0.0, 10.83, 13.82, 16.27, 18.47])
 # A detector confuses classes, so no class is impossible.
 CONFUSED = 0.02
-_STEP = 1e-4
-
-
-def box_chi2(
-    camera: _core.Camera,
-    pose_model: _core.PoseModel,
-    poses: NDArray[np.float64],
-    ellipsoids: NDArray[np.float64],
-    boxes: Detections,
-    covariance: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """Compare boxes with projected ellipsoids (m, 9) at poses (m, d): chi-square, 4 dof, (m,).
-
-    ``covariance`` [px^2] is that of the boxes, (m, 4, 4) and diagonal. An edge that the image cut
-    fits if the object reaches it. Infinite where the object is not in front of the camera.
-    """
-    predicted, in_front = _core.project_to_boxes(pose_model, camera, poses, ellipsoids)
-    error = predicted - boxes.box
-    beyond = np.where(error * [-1.0, -1.0, 1.0, 1.0] > 0.0, 0.0, error)
-    error = np.where(boxes.truncated, beyond, error)
-    variance = np.diagonal(covariance, axis1=1, axis2=2)
-    return np.where(in_front, np.sum(error**2 / variance, axis=1), np.inf)
 
 
 @dataclass(frozen=True)
@@ -51,11 +28,14 @@ class PredictedBoxes:
     """Pixels, shape (p, 4)."""
     covariance: NDArray[np.float64]
     """Of pose and object together, without the detector's noise, pixels^2, shape (p, 4, 4)."""
+    out_of_sight: NDArray[np.bool_]
+    """Edges that the object touches outside the image, shape (p, 4)."""
 
     def without(self, objects: NDArray[np.bool_]) -> PredictedBoxes:
         """Leave out some objects: a flag for each that ``object_row`` may name."""
         kept = ~objects[self.object_row]
-        return PredictedBoxes(self.object_row[kept], self.box[kept], self.covariance[kept])
+        fields = (self.object_row, self.box, self.covariance, self.out_of_sight)
+        return PredictedBoxes(*(field[kept] for field in fields))
 
 
 def predict_boxes(
@@ -69,14 +49,10 @@ def predict_boxes(
 
     ``covariance`` is that of the pose's tangent and all ellipsoids, jointly: (k + 9 o, k + 9 o).
     """
-    count = len(ellipsoids)
-    k = len(covariance) - 9 * count
-    here = np.repeat(pose[None], count, axis=0)
-    box, in_front = _core.project_to_boxes(pose_model, camera, here, ellipsoids)
+    here = np.repeat(pose[None], len(ellipsoids), axis=0)
+    box, in_front, jacobian = _core.differentiate_boxes(pose_model, camera, here, ellipsoids)
     row = np.flatnonzero(in_front & _overlaps_image(camera, box, margin=0.0))
-    if not row.size:
-        return PredictedBoxes(row, np.zeros((0, 4)), np.zeros((0, 4, 4)))
-    jacobian = _jacobian(camera, pose_model, here[row], ellipsoids[row], k)
+    k = len(covariance) - 9 * len(ellipsoids)
     own = np.concatenate(
         [np.tile(np.arange(k), (len(row), 1)), k + 9 * row[:, None] + np.arange(9)], 1
     )
@@ -84,10 +60,11 @@ def predict_boxes(
     # Of what nearly touches the camera, or may be anywhere in the image, nothing is predicted.
     size = float(np.hypot(camera.width, camera.height))
     with np.errstate(over="ignore", invalid="ignore"):
-        spread = jacobian @ joint @ jacobian.transpose(0, 2, 1)
-        variance = np.trace(np.nan_to_num(spread, nan=np.inf), axis1=1, axis2=2)
-    known = np.isfinite(spread).all(axis=(1, 2)) & (variance < size**2)
-    return PredictedBoxes(row[known], box[row[known]], spread[known])
+        spread = jacobian[row] @ joint @ jacobian[row].transpose(0, 2, 1)
+        known = np.trace(spread, axis1=1, axis2=2) < size**2  # false where it is not a number
+    row = row[known]
+    out_of_sight = _core.edges_out_of_sight(pose_model, camera, here[row], ellipsoids[row])
+    return PredictedBoxes(row, box[row], spread[known], out_of_sight)
 
 
 def in_image(
@@ -116,33 +93,6 @@ def _overlaps_image(
     return np.asarray(np.all(overlap > 0, axis=1))
 
 
-def _jacobian(
-    camera: _core.Camera,
-    pose_model: _core.PoseModel,
-    poses: NDArray[np.float64],
-    ellipsoids: NDArray[np.float64],
-    k: int,
-) -> NDArray[np.float64]:
-    """Differentiate boxes by the pose's tangent and the ellipsoid: (p, 4, k + 9)."""
-    count = len(poses)
-    all_poses, all_ellipsoids = [], []
-    for axis in range(k + 9):
-        for sign in (_STEP, -_STEP):
-            tangent = np.zeros((count, k))
-            shape = ellipsoids.copy()
-            if axis < k:
-                tangent[:, axis] = sign
-            else:
-                shape[:, axis - k] += sign
-            all_poses.append(_core.plus(pose_model, poses, tangent))
-            all_ellipsoids.append(shape)
-    box, _ = _core.project_to_boxes(
-        pose_model, camera, np.concatenate(all_poses), np.concatenate(all_ellipsoids)
-    )
-    box = box.reshape(k + 9, 2, count, 4)
-    return np.asarray(((box[:, 0] - box[:, 1]) / (2 * _STEP)).transpose(1, 2, 0))
-
-
 @dataclass(frozen=True)
 class PairCosts:
     """What it costs to say that a box shows an object, and that it shows something else."""
@@ -163,20 +113,26 @@ def pair_costs(
 ) -> PairCosts:
     """Compare boxes (b, 4) with predicted ones: ``d^2 + ln |2 pi S| - 2 ln p(class)``.
 
-    Edges that the image border cut take no part. ``class_probability`` (b, p) is that of the
-    box's class given the object. A box of something else may lie anywhere in the image and have
+    Edges that the image border cut take no part. On a box with such an edge, nor do those that the
+    object touches outside the image, unless it ends inside. ``class_probability`` (b, p) is that of
+    the box's class given the object. A box of something else may lie anywhere in the image and have
     any size up to half of it.
     """
-    cut = truncated[:, None, :]
-    error = np.where(cut, 0.0, box[:, None] - predicted.box)
-    # A cut edge: no error, and a variance that the determinant does not see.
+    error = box[:, None] - predicted.box
+    reaches = error * [-1.0, -1.0, 1.0, 1.0] < 0.0
+    is_cut = truncated.any(axis=1)[:, None, None]
+    ignored = truncated[:, None, :] | (is_cut & predicted.out_of_sight & reaches)
+    error = np.where(ignored, 0.0, error)
+    # An edge that is ignored: no error, and a variance that the determinant does not see.
     spread = predicted.covariance + box_covariance[:, None]
-    spread = np.where(cut[..., :, None] | cut[..., None, :], 0.0, spread)
-    spread = spread + (cut / (2 * np.pi))[..., None] * np.eye(4)
+    spread = np.where(ignored[..., :, None] | ignored[..., None, :], 0.0, spread)
+    spread = spread + (ignored / (2 * np.pi))[..., None] * np.eye(4)
     d2 = np.sum(error * np.linalg.solve(spread, error[..., None])[..., 0], axis=-1)
     log_det = np.linalg.slogdet(2 * np.pi * spread)[1]
-    edges = 4 - truncated.sum(axis=1)
-    inside = (d2 <= GATE[edges][:, None]) & (edges > 0)[:, None]
-    cost = np.where(inside, d2 + log_det - 2 * np.log(class_probability), np.inf)
-    volume = (camera.width * camera.height) ** 2 / 4.0
-    return PairCosts(cost=cost, null=2 * np.log(volume) * edges / 4.0)
+    edges = 4 - ignored.sum(axis=2)
+    inside = (d2 <= GATE[edges]) & (edges > 0)
+    # What an object says nothing of is anywhere, as if the box showed something else.
+    anywhere = 2 * np.log((camera.width * camera.height) ** 2 / 4.0) / 4.0
+    null = anywhere * (4 - truncated.sum(axis=1))
+    cost = d2 + log_det - 2 * np.log(class_probability) + null[:, None] - anywhere * edges
+    return PairCosts(cost=np.where(inside, cost, np.inf), null=null)

@@ -10,7 +10,6 @@ import numpy as np
 from dqslam import _core
 from dqslam._checks import Floats, Ints
 from dqslam._ids import ObjectRow
-from dqslam.association.gating import box_chi2
 from dqslam.association.labels import Labels
 from dqslam.association.noise import StepNoise, corrected
 from dqslam.assumptions import BoxNoise, OdometryNoise, SizePrior, SizePriors
@@ -203,14 +202,20 @@ class SceneMap:
     ) -> Floats:
         """Compare boxes with the projections of ellipsoids (b, 9): chi-square with 4 dof, (b,).
 
-        ``blur`` is the standard deviation, in pixels, that is added to the boxes' own; poses (n, d)
-        are by default the map's.
+        Infinite where the object is not in front of the camera. ``blur`` is the standard deviation,
+        in pixels, that is added to the boxes' own; poses (n, d) are by default the map's.
         """
-        boxes = self.recording.detections.select(rows)
-        seen_from = (self.poses if poses is None else poses)[boxes.pose]
-        model = self.recording.odometry.pose_model
+        detections = self.recording.detections
         covariance = self.box_covariance[rows] + blur**2 * np.eye(4)
-        return box_chi2(self.recording.camera, model, seen_from, ellipsoids, boxes, covariance)
+        return _core.box_chi_squares(
+            self.recording.odometry.pose_model,
+            self.recording.camera,
+            (self.poses if poses is None else poses)[detections.pose[rows]],
+            ellipsoids,
+            detections.box[rows],
+            covariance.reshape(-1, 16),
+            detections.truncated[rows],
+        )
 
     # ---- inside
 

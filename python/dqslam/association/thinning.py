@@ -43,38 +43,11 @@ def compose_covariance(
     path = _core.dead_reckon(odometry.pose_model, odometry.first_pose, odometry.relative)
     ends = np.repeat(keyframes[1:], np.diff(keyframes))
     steps = np.arange(keyframes[0], keyframes[-1])
-    after = _core.between(odometry.pose_model, path[steps + 1], path[ends])
-    moved = transport(odometry.pose_model, after)
+    # The error of a step, at its end, is one of the next keyframe as seen from there.
+    end_from_step = _core.between(odometry.pose_model, path[ends], path[steps + 1])
+    moved = _core.adjoint(odometry.pose_model, end_from_step)
     spread = moved @ covariance[steps] @ moved.transpose(0, 2, 1)
     return np.asarray(np.add.reduceat(spread, keyframes[:-1] - keyframes[0], axis=0))
-
-
-def transport(model: _core.PoseModel, relative: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return what a small change of a pose is for the pose that follows it, shape (n, k, k).
-
-    For poses b_in_a (n, d): ``(a (+) x) o b_in_a = (a o b_in_a) (+) M x`` to first order.
-    """
-    if model == _core.PoseModel.SE2:
-        c, s = np.cos(relative[:, 2]), np.sin(relative[:, 2])
-        matrix = np.zeros((len(relative), 3, 3))
-        matrix[:, :2, :2] = np.stack([np.stack([c, s], -1), np.stack([-s, c], -1)], -2)
-        lever = np.stack([-relative[:, 1], relative[:, 0]], -1)
-        matrix[:, :2, 2] = np.einsum("nij,nj->ni", matrix[:, :2, :2], lever)
-        matrix[:, 2, 2] = 1.0
-        return matrix
-    from scipy.spatial.transform import Rotation
-
-    turned = Rotation.from_quat(relative[:, 3:]).as_matrix().transpose(0, 2, 1)
-    x, y, z = relative[:, :3].T
-    zero = np.zeros_like(x)
-    # x r = -[t] r: the rotation of a moves b by the cross product.
-    lever = np.stack(
-        [np.stack([zero, z, -y], -1), np.stack([-z, zero, x], -1), np.stack([y, -x, zero], -1)], -2
-    )
-    matrix = np.zeros((len(relative), 6, 6))
-    matrix[:, :3, :3] = matrix[:, 3:, 3:] = turned
-    matrix[:, :3, 3:] = turned @ lever
-    return matrix
 
 
 def fill_in(
@@ -102,6 +75,6 @@ def bend_path(
     to_next = _core.between(model, path, path[last])
     next_key = poses[(part + 1).clip(max=len(keyframes) - 1)]
     missed = _core.minus(model, next_key, _core.compose(model, ahead, to_next))
-    back = np.linalg.solve(transport(model, to_next), missed[:, :, None])[:, :, 0]
+    back = (_core.adjoint(model, to_next) @ missed[:, :, None])[:, :, 0]
     share = (np.arange(len(path)) - first) / np.maximum(last - first, 1)
     return _core.plus(model, ahead, back * share[:, None])

@@ -68,16 +68,13 @@ def fit_boxes(results: Results) -> BoxFits:
     row_of = {int(number): row for row, number in enumerate(objects.object_ids)}
     row = np.array([row_of.get(int(number), -1) for number in boxes.object_id], dtype=np.int64)
     mapped = np.flatnonzero(row >= 0)
-    ellipsoids = objects.ellipsoids[row[mapped]]
-    real = np.isfinite(ellipsoids).all(axis=1)
-    box, in_front = _core.project_to_boxes(
+    predicted = np.full((len(boxes), 4), np.nan)
+    predicted[mapped], _ = _core.project_to_boxes(
         _core.PoseModel.SE3,
         results.camera,
-        results.poses[boxes.pose[mapped[real]]],
-        ellipsoids[real],
+        results.poses[boxes.pose[mapped]],
+        objects.ellipsoids[row[mapped]],
     )
-    predicted = np.full((len(boxes), 4), np.nan)
-    predicted[mapped[real]] = np.where(in_front[:, None], box, np.nan)
     noise = _noise(results)
     variance = np.diagonal(noise.covariance(boxes.box), axis1=1, axis2=2)
     residual = np.where(boxes.truncated, np.nan, predicted - boxes.box) / np.sqrt(variance)

@@ -34,11 +34,7 @@ class Views:
 
 def inverted(poses: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the poses (..., 7) read as camera_from_world."""
-    from scipy.spatial.transform import Rotation
-
-    flat = poses.reshape(-1, 7)
-    turn = Rotation.from_quat(flat[:, 3:]).inv()
-    return np.hstack([-turn.apply(flat[:, :3]), turn.as_quat()]).reshape(poses.shape)
+    return _core.inverse(_core.PoseModel.SE3, poses.reshape(-1, 7)).reshape(poses.shape)
 
 
 def residuals(camera: _core.Camera, views: Views) -> NDArray[np.float64]:

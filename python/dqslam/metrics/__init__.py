@@ -17,9 +17,8 @@ from dqslam.metrics.objects import match_by_id as match_by_id
 from dqslam.metrics.objects import match_nearest as match_nearest
 from dqslam.metrics.objects import orientation_error as orientation_error
 from dqslam.metrics.objects import size_error as size_error
-from dqslam.metrics.outline import boxes_through_lens as boxes_through_lens
-from dqslam.metrics.outline import project_outlines as project_outlines
 from dqslam.metrics.outline import through_lens as through_lens
+from dqslam.metrics.outline import visible_outlines as visible_outlines
 from dqslam.metrics.simulation import Report as Report
 from dqslam.metrics.simulation import box_volumes as box_volumes
 from dqslam.metrics.simulation import cube_volumes as cube_volumes

@@ -49,11 +49,9 @@ def reprojection_iou(
     edges (m, 4); the camera has no mount. Behind a truncated edge nothing can be seen, hence
     nothing is compared. 0 where the ellipsoid is not strictly in front of the camera.
     """
-    real = np.all(np.isfinite(ellipsoids), axis=1)
-    predicted, in_front = _core.project_to_boxes(
-        _core.PoseModel.SE3, camera, world_from_camera, np.where(real[:, None], ellipsoids, 1.0)
+    predicted, visible = _core.project_to_boxes(
+        _core.PoseModel.SE3, camera, world_from_camera, ellipsoids
     )
-    visible = real & in_front
     predicted = np.where(visible[:, None], predicted, boxes)
     low, high = predicted[:, :2], predicted[:, 2:]
     low = np.where(truncated[:, :2], np.maximum(low, boxes[:, :2]), low)
@@ -83,9 +81,8 @@ def ellipsoid_iou(ellipsoid: Floats, other: Floats, *, samples: int = 4096, seed
 
 def _center_and_factor(ellipsoid: Floats) -> tuple[Floats, Floats]:
     """Return center (3,) and L (3, 3), which turns the unit ball into the ellipsoid."""
-    shape = -_core.dual_quadric_matrix(_core.dual_quadric_from_ellipsoid(ellipsoid))[:3, :3]
-    center = ellipsoid[:3]
-    return center, np.asarray(np.linalg.cholesky(shape + np.outer(center, center)))
+    (shape,) = _core.ellipsoid_shapes(ellipsoid[None])
+    return ellipsoid[:3], np.asarray(np.linalg.cholesky(shape))
 
 
 def _unit_ball(samples: int, seed: int) -> Floats:

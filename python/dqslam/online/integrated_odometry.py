@@ -9,7 +9,6 @@ import numpy as np
 from dqslam import _core
 from dqslam._checks import Floats
 from dqslam.association.noise import translation_axes
-from dqslam.association.thinning import transport
 from dqslam.recording import pose_size, tangent_size
 
 
@@ -43,7 +42,7 @@ class IntegratedOdometry:
         k = len(covariance)
         is_translation = np.arange(k) < translation_axes(k)
         step = np.array([covariance, np.diag(is_translation), np.diag(~is_translation)])
-        moved = transport(pose_model, relative[None])[0]
+        moved = _core.adjoint(pose_model, _core.inverse(pose_model, relative[None]))[0]
         return IntegratedOdometry(
             _core.compose(pose_model, self.relative[None], relative[None])[0],
             moved @ self.covariances @ moved.T + step,

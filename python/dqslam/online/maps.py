@@ -20,8 +20,6 @@ from dqslam.recording import tangent_size
 UNKNOWN_CENTER_SIGMA_M, UNKNOWN_LOG_SIGMA = 0.05, 0.1
 # An orientation is never known worse than by this [rad]: where axes are equal it says nothing.
 MAX_ANGLE_SIGMA = 0.5
-# Of the differences that stand for derivatives.
-_STEP = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,24 +80,12 @@ def _shape_covariance(semi_axes: Floats, orientation_xyzw: Floats, log_sigma: Fl
     an angle a in the plane of axes i and j changes log S by (log s_i - log s_j) a. Angles have the
     sigma at which that equals the larger of the two log sigmas.
     """
-    from scipy.spatial.transform import Rotation
-
-    def shape(axes: Floats, quaternion: Floats) -> Floats:
-        return _core.ellipsoid_from_axes(np.zeros(3), axes, quaternion)[3:]
-
-    origin, logs = shape(semi_axes, orientation_xyzw), np.log(semi_axes)
-    columns = []
-    for axis, unit in enumerate(np.eye(3)):
-        grown = shape(semi_axes * np.exp(_STEP * unit), orientation_xyzw)
-        columns.append((grown - origin) / _STEP * log_sigma[axis])
-    for axis, unit in enumerate(np.eye(3)):
-        i, j = (axis + 1) % 3, (axis + 2) % 3
-        apart = abs(logs[i] - logs[j]) + 1e-3
-        sigma = min(max(log_sigma[i], log_sigma[j]) / apart, MAX_ANGLE_SIGMA)
-        turned = Rotation.from_quat(orientation_xyzw) * Rotation.from_rotvec(_STEP * unit)
-        columns.append((shape(semi_axes, turned.as_quat()) - origin) / _STEP * sigma)
-    jacobian = np.array(columns).T
-    return np.asarray(jacobian @ jacobian.T + 1e-10 * np.eye(6))
+    logs = np.log(semi_axes)
+    apart = np.abs(np.roll(logs, -1) - np.roll(logs, -2)) + 1e-3
+    wider = np.maximum(np.roll(log_sigma, -1), np.roll(log_sigma, -2))
+    sigma = np.concatenate([log_sigma, np.minimum(wider / apart, MAX_ANGLE_SIGMA)])
+    spread = _core.shape_from_axes_jacobian(semi_axes, orientation_xyzw) * sigma
+    return np.asarray(spread @ spread.T + 1e-10 * np.eye(6))
 
 
 def _with_mount(camera: _core.Camera, robot_from_camera: ArrayLike | None) -> _core.Camera:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dqslam import _core
-from dqslam.association import gating
+from dqslam.association import CHI2_GATE
 from dqslam.assumptions import BoxNoise, SizePrior, SizePriors
 from dqslam.estimate import Estimate
 from dqslam.recording import Detections
@@ -17,22 +17,22 @@ from dqslam.recording import Detections
 def box_chi2(estimate: Estimate, detections: Detections, noise: BoxNoise) -> NDArray[np.float64]:
     """Compare boxes with the estimate: chi-square with 4 dof, shape (m,).
 
-    An edge that the image cut fits if the object reaches it. Infinite where the object is not in
-    front of the camera that saw it, no ellipsoid, or dropped.
+    Infinite where the object is not in front of the camera that saw it, no ellipsoid, or dropped.
     """
     if not len(estimate.object_ids):
         return np.full(len(detections), np.inf)
     row = np.searchsorted(estimate.object_ids, detections.object_id).clip(
         max=len(estimate.object_ids) - 1
     )
-    mapped = estimate.is_ellipsoid[row] & (estimate.object_ids[row] == detections.object_id)
-    chi2 = gating.box_chi2(
-        estimate.camera,
+    mapped = estimate.object_ids[row] == detections.object_id
+    chi2 = _core.box_chi_squares(
         estimate.pose_model,
+        estimate.camera,
         estimate.poses[detections.pose],
-        np.where(estimate.is_ellipsoid[:, None], estimate.ellipsoids, 1.0)[row],
-        detections,
-        noise.covariance(detections.box),
+        estimate.ellipsoids[row],
+        detections.box,
+        noise.covariance(detections.box).reshape(-1, 16),
+        detections.truncated,
     )
     return np.where(mapped, chi2, np.inf)
 
@@ -42,7 +42,7 @@ def describe_boxes(chi2: NDArray[np.float64]) -> dict[str, Any]:
     return {
         "count": len(chi2),
         "chi2_median": float(np.median(chi2)) if len(chi2) else None,
-        "outlier_share": float(np.mean(chi2 > gating.CHI2_GATE[4])) if len(chi2) else None,
+        "outlier_share": float(np.mean(chi2 > CHI2_GATE[4])) if len(chi2) else None,
         "not_in_front": int(np.sum(np.isinf(chi2))),
     }
 

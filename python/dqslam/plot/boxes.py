@@ -6,7 +6,8 @@ import numpy as np
 
 from dqslam.evaluation import BoxFits
 from dqslam.io import Results
-from dqslam.plot.frame import draw_boxes, rectangle, visible_outlines
+from dqslam.metrics import visible_outlines
+from dqslam.plot.frame import draw_boxes, rectangle
 from dqslam.plot.labels import place_labels
 from dqslam.plot.style import (
     COLUMN_INCHES,
@@ -73,7 +74,8 @@ def _draw(
     axes: "Axes", results: Results, fits: BoxFits, pose: int, styles: dict[str, dict[str, Any]]
 ) -> None:
     detected = draw_boxes(axes, results, fits, pose, styles, lens=False, linewidth=1.0)
-    rows, outlines = visible_outlines(results, pose, lens=False)
+    here, ellipsoids = results.world_from_camera[pose], results.objects.ellipsoids
+    rows, outlines = visible_outlines(results.camera, here, ellipsoids)
     for row, outline in zip(rows, outlines, strict=True):
         if row not in detected:
             continue

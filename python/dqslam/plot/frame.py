@@ -5,10 +5,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dqslam._checks import Bools, Floats, Ints
+from dqslam._checks import Floats, Ints
 from dqslam.evaluation import BoxFits
 from dqslam.io import Results
-from dqslam.metrics import boxes_through_lens, project_outlines, through_lens
 from dqslam.plot.style import GRAY
 
 if TYPE_CHECKING:
@@ -36,7 +35,7 @@ def draw_boxes(
     rows = np.flatnonzero(fits.boxes.pose == pose)
     boxes = fits.boxes.box[rows]
     if lens:
-        boxes = boxes_through_lens(results.camera, boxes)
+        boxes = results.camera.distort_boxes(boxes)
     for row, box in zip(rows, boxes, strict=True):
         seen = fits.object_row[row]
         color = unmapped if seen < 0 else styles[results.objects.class_names[seen]]["color"]
@@ -51,33 +50,7 @@ def draw_boxes(
     return np.unique(fits.object_row[rows][fits.object_row[rows] >= 0])
 
 
-def visible_outlines(results: Results, pose: int, *, lens: bool) -> tuple[Ints, Floats]:
-    """Return the rows of the objects that the image of a pose shows, far ones first, and outlines.
-
-    Shapes (v,) and (v, n, 2). Whether anything hides them is not known.
-    """
-    camera, objects = results.camera, results.objects
-    here = np.repeat(results.poses[[pose]], len(objects), axis=0)
-    outlines = project_outlines(camera, here, objects.ellipsoids)
-    if lens:
-        outlines = through_lens(camera, outlines)
-    shown = np.flatnonzero(_in_image(outlines, np.array([camera.width, camera.height])))
-    distance = np.linalg.norm(objects.centers[shown] - here[shown, :3], axis=1)
-    order = np.argsort(-distance, kind="stable")
-    return shown[order], outlines[shown[order]]
-
-
 def rectangle(box: Floats) -> Floats:
     """Return the corners (2, 5) of a box, the first again at the end."""
     u_min, v_min, u_max, v_max = box
     return np.array([[u_min, u_max, u_max, u_min, u_min], [v_min, v_min, v_max, v_max, v_min]])
-
-
-def _in_image(outlines: Floats, size: Floats) -> Bools:
-    """Return whether each outline (m, n, 2) has any part in the image."""
-    if not len(outlines):
-        return np.zeros(0, dtype=np.bool_)
-    known = np.all(np.isfinite(outlines), axis=2)
-    low = np.where(known[:, :, None], outlines, np.inf).min(axis=1)
-    high = np.where(known[..., None], outlines, -np.inf).max(axis=1)
-    return np.asarray((high >= -0.5).all(axis=1) & (low <= size - 0.5).all(axis=1))

@@ -8,7 +8,7 @@ import numpy as np
 
 from dqslam import _core
 from dqslam._checks import Floats
-from dqslam.estimate import Estimate, quadric_shapes
+from dqslam.estimate import Estimate
 from dqslam.plot.above import outline
 from dqslam.plot.style import ESTIMATE, ODOMETRY, TRUTH, new_figure, save_figure
 from dqslam.recording import Truth
@@ -108,8 +108,7 @@ def _true_outlines(truth: Truth) -> list[Floats]:
         radii = np.cbrt(0.75 / np.pi * truth.volume)
         shapes = radii[:, None, None] ** 2 * np.eye(3)
     else:
-        quadrics = [_core.dual_quadric_from_ellipsoid(row) for row in truth.ellipsoids]
-        shapes = quadric_shapes(np.array(quadrics))
+        shapes = _core.ellipsoid_shapes(truth.ellipsoids)
     return [_outline(*one) for one in zip(truth.center, shapes, strict=True)]
 
 

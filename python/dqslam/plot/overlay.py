@@ -11,7 +11,8 @@ from dqslam._checks import Floats
 from dqslam._files import FileError, whole_file
 from dqslam.evaluation import fit_boxes
 from dqslam.io import Results
-from dqslam.plot.frame import draw_boxes, visible_outlines
+from dqslam.metrics import visible_outlines
+from dqslam.plot.frame import draw_boxes
 from dqslam.plot.style import class_styles, column_style, new_figure, save_figure
 
 if TYPE_CHECKING:
@@ -73,7 +74,10 @@ class Overlay:
                 linewidth=0.6 * self._scale,
                 unmapped="white",
             )
-        rows, outlines = visible_outlines(self._results, pose, lens=True)
+        here = self._results.world_from_camera[pose]
+        rows, outlines = visible_outlines(
+            self._results.camera, here, self._results.objects.ellipsoids, lens=True
+        )
         for row, outline in zip(rows, outlines, strict=True):
             self._draw_object(axes, int(row), outline, is_detected=bool(np.isin(row, detected)))
         return self.figure

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from dqslam import _core
 from dqslam._checks import Floats
 from dqslam.io import MapObjects, Results, TrueObjects
 from dqslam.metrics import Alignment
@@ -126,15 +127,12 @@ def _true_path(view: FromAbove, truth: MapTruth) -> Floats:
 def _outlines(view: FromAbove, objects: MapObjects, move: Alignment) -> list[Floats]:
     """Return the outline of each object (2, n); a point where it is no ellipsoid."""
     centers = move.apply(objects.centers)
-    found = []
-    for row, center in enumerate(centers):
-        if objects.is_ellipsoid[row]:
-            axes = _turns(objects.orientations[row]) * (move.scale * objects.semi_axes[row])
-            axes = move.rotation @ axes
-            found.append(view.outline(center, axes @ axes.T))
-        else:
-            found.append(view.points(center[None]).T)
-    return found
+    turn = move.scale * move.rotation
+    shapes = turn @ _core.ellipsoid_shapes(objects.ellipsoids) @ turn.T
+    return [
+        view.outline(center, shape) if is_ellipsoid else view.points(center[None]).T
+        for center, shape, is_ellipsoid in zip(centers, shapes, objects.is_ellipsoid, strict=True)
+    ]
 
 
 def _true_outlines(view: FromAbove, objects: TrueObjects | None) -> list[Floats]:

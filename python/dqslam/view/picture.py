@@ -7,7 +7,7 @@ from html import escape
 import numpy as np
 
 from dqslam._checks import Floats, Ints
-from dqslam.metrics import project_outlines
+from dqslam.metrics import visible_outlines
 from dqslam.view.scene import Scene
 
 _DASHES = {"fits": "", "misfit": "6 4", "held out": "1.5 3", "left out": ""}
@@ -24,16 +24,7 @@ def outlines_in_image(scene: Scene, frame: int) -> tuple[Ints, Floats]:
     for row, one in enumerate(scene.objects):
         if one.ellipsoid is not None:
             ellipsoids[row] = one.ellipsoid
-    pose = scene.estimate[frame]
-    poses = np.tile(pose, (len(ellipsoids), 1))
-    outlines = project_outlines(scene.camera, poses, ellipsoids, points=_POINTS)
-    low, high = outlines.min(axis=1), outlines.max(axis=1)
-    last = np.array([scene.camera.width, scene.camera.height]) - 0.5
-    meets = np.all((high > -0.5) & (low < last), axis=1)  # comparisons with NaN are false
-    rows = np.flatnonzero(meets)
-    away = np.linalg.norm(ellipsoids[rows, :3] - pose[:3], axis=1)
-    rows = rows[np.argsort(-away, kind="stable")]
-    return rows, outlines[rows]
+    return visible_outlines(scene.camera, scene.estimate[frame], ellipsoids, points=_POINTS)
 
 
 def draw_image(scene: Scene, frame: int, selected: int | None = None) -> str:

@@ -67,15 +67,8 @@ def read_covariances(path: str | Path, timestamps: Floats) -> Floats:
 
 
 def motion_of_camera(model: _core.PoseModel, camera: _core.Camera) -> Floats:
-    """Return what turns a small motion of the robot into one of its camera, shape (6, k).
-
-    A camera at t, turned by R, on a robot that moves by v and turns by w, all in its frame, moves
-    by R^T (v + w x t) and turns by R^T w.
-    """
-    from scipy.spatial.transform import Rotation
-
-    turn = Rotation.from_quat(camera.robot_from_camera[3:]).as_matrix().T
-    x, y, z = camera.robot_from_camera[:3]
-    cross = np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])  # w -> w x t
-    full = np.block([[turn, turn @ cross], [np.zeros((3, 3)), turn]])
-    return full[:, [0, 1, 5]] if model == _core.PoseModel.SE2 else full
+    """Return what turns a small motion of the robot into that of its camera, shape (6, k)."""
+    se3 = _core.PoseModel.SE3
+    camera_from_robot = _core.inverse(se3, camera.robot_from_camera[None])
+    (full,) = _core.adjoint(se3, camera_from_robot)
+    return np.asarray(full[:, [0, 1, 5]] if model == _core.PoseModel.SE2 else full)

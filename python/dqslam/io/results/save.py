@@ -108,24 +108,9 @@ def _object(estimate: Estimate, row: int, marginals: Covariances | None) -> dict
     covariance = None if marginals is None else marginals.objects[row]
     if covariance is None or semi_axes is None or not np.isfinite(covariance).all():
         return described
-    variance = np.diagonal(_in_log_semi_axes(estimate.ellipsoids[row], covariance[3:, 3:]))
+    jacobian = _core.log_semi_axes_jacobian(estimate.ellipsoids[row])
+    variance = np.diagonal(jacobian @ covariance @ jacobian.T)
     return described | {
         "center_covariance": covariance[:3, :3],
         "log_semi_axes_sigma": np.sqrt(variance),
     }
-
-
-def _in_log_semi_axes(ellipsoid: Floats, covariance: Floats) -> Floats:
-    """Return the covariance of the logarithms of the semi-axes, descending, shape (3, 3).
-
-    From that of the log-Cholesky shape, (6, 6). With S = L L^T, S v = a^2 v and |v| = 1,
-    d log a = v^T dS v / (2 a^2) = (v^T dL L^T v) / a^2.
-    """
-    lower = np.diag(np.exp(ellipsoid[3:6]))
-    lower[[1, 2, 2], [0, 0, 1]] = ellipsoid[6:]
-    squares, axes = np.linalg.eigh(lower @ lower.T)
-    squares, axes = squares[::-1], axes[:, ::-1]
-    rows, columns = [0, 1, 2, 1, 2, 2], [0, 1, 2, 0, 0, 1]
-    scale = np.append(np.diag(lower), np.ones(3))  # dL of a logarithm is the entry itself
-    jacobian = (axes[rows] * (lower.T @ axes)[columns]).T * scale / squares[:, None]
-    return np.asarray(jacobian @ covariance @ jacobian.T)
