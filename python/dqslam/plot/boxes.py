@@ -74,7 +74,7 @@ def _draw(
     axes: "Axes", results: Results, fits: BoxFits, pose: int, styles: dict[str, dict[str, Any]]
 ) -> None:
     detected = draw_boxes(axes, results, fits, pose, styles, lens=False, linewidth=1.0)
-    here, ellipsoids = results.world_from_camera[pose], results.objects.ellipsoids
+    here, ellipsoids = results.poses[pose], results.objects.ellipsoids
     rows, outlines = visible_outlines(results.camera, here, ellipsoids)
     for row, outline in zip(rows, outlines, strict=True):
         if row not in detected:

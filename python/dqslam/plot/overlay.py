@@ -74,7 +74,7 @@ class Overlay:
                 linewidth=0.6 * self._scale,
                 unmapped="white",
             )
-        here = self._results.world_from_camera[pose]
+        here = self._results.poses[pose]
         rows, outlines = visible_outlines(
             self._results.camera, here, self._results.objects.ellipsoids, lens=True
         )
