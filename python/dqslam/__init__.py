@@ -12,6 +12,7 @@ if TYPE_CHECKING:  # what type checkers see; a test holds it and the table below
     from dqslam._core import OnlineOptions as OnlineOptions
     from dqslam._core import PoseModel as PoseModel
     from dqslam._core import ScenePriors as ScenePriors
+    from dqslam._core import SmoothingLevel as SmoothingLevel
     from dqslam._core import SolveOptions as SolveOptions
     from dqslam._core import Summary as Summary
     from dqslam.association import Association as Association
@@ -63,6 +64,7 @@ _NAMES = {
         "OnlineOptions",
         "PoseModel",
         "ScenePriors",
+        "SmoothingLevel",
         "SolveOptions",
         "Summary",
     ),

@@ -11,8 +11,7 @@ namespace dqslam {
 namespace {
 
 // Most boxes of an object beyond this, or all in the mean beyond twice as much: it is stuck.
-constexpr double kImpossibleBox = 13.28;  // chi-square of 4 degrees of freedom, 99 %
-constexpr double kImpossibleMean = 2 * kImpossibleBox;
+constexpr double kImpossibleBox = kBoxChiSquare99, kImpossibleMean = 2 * kImpossibleBox;
 constexpr double kImpossibleSize = 21.1;  // chi-square of 3 degrees of freedom, 99.99 %
 constexpr double kTorn = 5;               // chi-square of odometry, per degree of freedom
 constexpr int kMaxRestarts = 2;

@@ -30,6 +30,7 @@ using Vector4 = Eigen::Matrix<T, 4, 1>;
 template <typename T>
 using Matrix3 = Eigen::Matrix<T, 3, 3>;
 using Vector9d = Eigen::Matrix<double, 9, 1>;
+using Matrix9d = Eigen::Matrix<double, 9, 9>;
 
 /// A table: one row per item.
 using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;

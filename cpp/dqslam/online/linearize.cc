@@ -15,7 +15,7 @@ struct CenterShapeModel;
 // For ByPoseAndLandmark(): derivatives by the center_shape instead of a landmark's parameters.
 template <>
 struct Unpacked<CenterShapeModel> {
-  explicit Unpacked(const Vector9d& center_shape) : surface(online::SurfaceOf(center_shape)) {}
+  explicit Unpacked(const Vector9d& center_shape) : surface(SurfaceOf(center_shape)) {}
   Vector9d Gradient(const Eigen::Vector3d& m, double by_center, double by_shape) const {
     const Eigen::Vector3d b = by_shape * m;
     Vector9d gradient;
@@ -45,41 +45,32 @@ void Weigh(double loss_scale, double s, double* cost, double* loss) {
 }
 
 // Error by edge of the box's residual where `depth` is 0, else of the tangents', with derivatives
-// where they are asked for; false where it is undefined.
-template <bool kDerivatives>
+// unless `edges` is null; false where it is undefined.
 bool EdgeErrors(const Camera& camera,
                 const Observation& observation,
                 const Surface<double>& in_camera,
                 double depth,
                 Vector4d* error,
                 EdgeDerivatives* edges) {
+  const auto ignore = [&](const EdgeFlags& one_sided, const double (&outward)[kBoxSize]) {
+    edges ? IgnoreBeyond(one_sided, outward, error, edges)
+          : IgnoreBeyond(one_sided, error, outward);
+  };
   if (depth == 0) {
     Vector4d box;
-    if constexpr (kDerivatives) {
-      if (!DifferentiateBox(in_camera, camera, &box, edges)) return false;
-    } else {
-      if (!ProjectToBox(in_camera, camera, &box)) return false;
-    }
+    const bool is_defined = edges ? DifferentiateBox(in_camera, camera, &box, edges)
+                                  : ProjectToBox(in_camera, camera, &box);
+    if (!is_defined) return false;
     *error = box - observation.value;
-    if (!observation.truncated.any()) return true;
-    IgnoreBeyond(OneSidedEdges(observation.truncated, camera, in_camera, box), error);
-  } else {
-    if constexpr (kDerivatives) {
-      if (!DifferentiateTangents(in_camera, camera, observation.value, depth, error, edges))
-        return false;
-    } else {
-      if (!TangentDistances(in_camera, camera, observation.value, depth, error)) return false;
-    }
-    if (!observation.truncated.any()) return true;
-    IgnoreBeyond(observation.truncated, error, kTangentOutward);
+    if (observation.truncated.any())
+      ignore(OneSidedEdges(observation.truncated, camera, in_camera, box), kBoxOutward);
+    return true;
   }
-  if constexpr (kDerivatives) {
-    // Ignored.
-    for (int edge = 0; edge < kBoxSize; ++edge) {
-      if ((*error)[edge] == 0) edges->by_center[edge] = edges->by_shape[edge] = 0;
-    }
-  }
-  return true;
+  const Vector4d& box = observation.value;
+  const bool is_defined = edges ? DifferentiateTangents(in_camera, camera, box, depth, error, edges)
+                                : TangentDistances(in_camera, camera, box, depth, error);
+  if (is_defined) ignore(observation.truncated, kTangentOutward);
+  return is_defined;
 }
 
 // Returns the error by edge, and fills all of `linear` that the loss has no part in.
@@ -88,16 +79,16 @@ Vector4d LinearizeBox(const Model& model,
                       const Station& station,
                       const Observation& observation,
                       const Unpacked<CenterShapeModel>& object,
-                      Edges residual,
-                      Linear<Pose>* linear) {
+                      EdgeResidual residual,
+                      LinearizedObservation<Pose>* linear) {
   const Surface<double> in_camera = ToCamera(station.camera, object.surface);
   Vector4d error;
   EdgeDerivatives edges;
   linear->depth = 0;
-  if (residual == Edges::kTangent ||
-      !EdgeErrors<true>(model.camera, observation, in_camera, 0, &error, &edges)) {
+  if (residual == EdgeResidual::kTangent ||
+      !EdgeErrors(model.camera, observation, in_camera, 0, &error, &edges)) {
     linear->depth = TangentDepth(in_camera);
-    if (!EdgeErrors<true>(model.camera, observation, in_camera, linear->depth, &error, &edges)) {
+    if (!EdgeErrors(model.camera, observation, in_camera, linear->depth, &error, &edges)) {
       // A shape that rounding has flattened: CostOfObservation() is infinite there.
       linear->by_pose.setZero();
       linear->by_object.setZero();
@@ -124,7 +115,7 @@ template <typename Pose>
 Vector4d LinearizePosition(const Station& station,
                            const Observation& observation,
                            const Vector3d& center,
-                           Linear<Pose>* linear) {
+                           LinearizedObservation<Pose>* linear) {
   const Vector4d error = PositionError(station, observation, center);
   const Eigen::Matrix3d& R = station.world_from_robot.rotation;
   const Vector3d q = observation.value.head<3>() - error.head<3>();
@@ -157,12 +148,12 @@ double CostOfObservation(const Model& model,
   *chi_square = std::numeric_limits<double>::infinity();
   if (!observation.is_box) {
     error = PositionError(station, observation, object.center);
-  } else if (!EdgeErrors<false>(model.camera,
-                                observation,
-                                ToCamera(station.camera, object),
-                                depth,
-                                &error,
-                                nullptr)) {
+  } else if (!EdgeErrors(model.camera,
+                         observation,
+                         ToCamera(station.camera, object),
+                         depth,
+                         &error,
+                         nullptr)) {
     return *chi_square;
   }
   *chi_square = (observation.sqrt_information * error).squaredNorm();
@@ -176,8 +167,8 @@ void Linearize(const Model& model,
                const Station& station,
                const Observation& observation,
                const Vector9d& center_shape,
-               Edges edges,
-               Linear<Pose>* linear) {
+               EdgeResidual edges,
+               LinearizedObservation<Pose>* linear) {
   const Unpacked<CenterShapeModel> object(center_shape);
   const Eigen::Matrix4d& W = observation.sqrt_information;
   linear->residual =
@@ -194,9 +185,9 @@ void Linearize(const Model& model,
 }
 
 template <typename Pose>
-LinearStep<Pose> LinearizeStep(const typename History<Pose>::Step& step,
-                               const double* from,
-                               const double* to) {
+LinearizedStep<Pose> LinearizeStep(const typename History<Pose>::Step& step,
+                                   const double* from,
+                                   const double* to) {
   constexpr int k = Pose::kTangentSize;
   using Jet = ceres::Jet<double, 2 * k>;
   Jet moved_from[Pose::kSize], moved_to[Pose::kSize], residual[k];
@@ -204,7 +195,7 @@ LinearStep<Pose> LinearizeStep(const typename History<Pose>::Step& step,
   PoseJets<Pose>(to, k, moved_to);
   const OdometryCost<Pose> cost{{}, step.relative, step.sqrt_information};
   cost(moved_from, moved_to, residual);
-  LinearStep<Pose> linear;
+  LinearizedStep<Pose> linear;
   Eigen::Matrix<double, k, 2 * k> jacobian;
   SplitJets(residual, &linear.residual, &jacobian);
   linear.by_from = jacobian.template leftCols<k>();
@@ -251,7 +242,7 @@ double AddPriors(const Model& model,
   using Jet = ceres::Jet<double, 9>;
   Jet at[9];
   PlainJets<9>(center_shape.data(), 0, at);
-  double cost = CostOf(object.map, center_shape);
+  double cost = object.map.CostAt(center_shape);
   const bool defined = ForPriors(model, object, at, [&](const Jet* residual, int count) {
     for (int i = 0; i < count; ++i) {
       sum->H.noalias() += residual[i].v * residual[i].v.transpose();
@@ -260,12 +251,12 @@ double AddPriors(const Model& model,
     }
   });
   sum->H += object.map.H;
-  sum->g += GradientOf(object.map, center_shape);
+  sum->g += object.map.GradientAt(center_shape);
   return defined ? cost : std::numeric_limits<double>::infinity();
 }
 
 double CostOfPriors(const Model& model, const Object& object, const Vector9d& center_shape) {
-  double cost = CostOf(object.map, center_shape);
+  double cost = object.map.CostAt(center_shape);
   const auto add = [&](const double* residual, int count) {
     for (int i = 0; i < count; ++i) cost += 0.5 * residual[i] * residual[i];
   };
@@ -291,13 +282,17 @@ double LinearizeHeight(const Model& model,
   return residual.a;
 }
 
-#define DQSLAM_INSTANTIATE(Pose)                                                                \
-  template void Linearize<Pose>(                                                                \
-      const Model&, const Station&, const Observation&, const Vector9d&, Edges, Linear<Pose>*); \
-  template LinearStep<Pose> LinearizeStep<Pose>(                                                \
-      const History<Pose>::Step&, const double*, const double*);                                \
-  template double CostOfStep<Pose>(const History<Pose>::Step&, const double*, const double*);   \
-  template double LinearizeHeight<Pose>(                                                        \
+#define DQSLAM_INSTANTIATE(Pose)                                                              \
+  template void Linearize<Pose>(const Model&,                                                 \
+                                const Station&,                                               \
+                                const Observation&,                                           \
+                                const Vector9d&,                                              \
+                                EdgeResidual,                                                 \
+                                LinearizedObservation<Pose>*);                                \
+  template LinearizedStep<Pose> LinearizeStep<Pose>(                                          \
+      const History<Pose>::Step&, const double*, const double*);                              \
+  template double CostOfStep<Pose>(const History<Pose>::Step&, const double*, const double*); \
+  template double LinearizeHeight<Pose>(                                                      \
       const Model&, const double*, Eigen::Matrix<double, Pose::kTangentSize, 1>*)
 DQSLAM_INSTANTIATE(Se2);
 DQSLAM_INSTANTIATE(Se3);

@@ -1,8 +1,7 @@
-// What a pose saw, as a caller gives it, and as a history keeps it.
+// What a step brings, as a caller gives it, and as a history keeps it.
 #pragma once
 
 #include "dqslam/online/history.h"
-#include "dqslam/problem/graph.h"
 
 namespace dqslam::online {
 
@@ -23,5 +22,11 @@ struct StepObservations {
 /// As rows of a history, for a pose and a number of objects that there are.  Throws
 /// std::invalid_argument naming the table and the row for what is wrong.
 std::vector<Observation> CheckedObservations(const StepObservations& given, int pose, int objects);
+
+/// Odometry; of a first pose that is known there is no covariance.  Throws std::invalid_argument.
+template <typename Pose>
+typename History<Pose>::Step CheckedStep(const Eigen::VectorXd& relative,
+                                         const RowMatrix& covariance,
+                                         bool first_is_known);
 
 }  // namespace dqslam::online

@@ -49,6 +49,9 @@ enum class Backend {
   kCeres,   ///< ceres::Solve on AutoDiff cost functions: slower, a second opinion
 };
 
+/// 99 % and 99.9 % of chi-square with four degrees of freedom, the edges of a box.
+inline constexpr double kBoxChiSquare99 = 13.28, kBoxChiSquare999 = 18.47;
+
 struct SolveOptions {
   Mode mode = Mode::kSlam;
   Residual residual = Residual::kTangentThenBox;
@@ -56,9 +59,9 @@ struct SolveOptions {
   Start start = Start::kSphere;
   Schedule schedule = Schedule::kGrow;
   Loss loss = Loss::kNone;
-  double loss_scale = 2.0;            ///< of Huber and Cauchy: sigmas of a whole box
-  double outlier_chi_square = 13.28;  ///< of the others: 99 % of chi-square with 4 dof
-  double algebraic_sigma = 1.0;       ///< of both algebraic residuals, their own unit
+  double loss_scale = 2.0;                      ///< of Huber and Cauchy: sigmas of a whole box
+  double outlier_chi_square = kBoxChiSquare99;  ///< of the others
+  double algebraic_sigma = 1.0;                 ///< of both algebraic residuals, their own unit
   Backend backend = Backend::kNative;
   Minimizer minimizer = Minimizer::kDogleg;  ///< of the last stage
   int max_iterations = 300;                  ///< of each batch stage

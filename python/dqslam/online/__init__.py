@@ -1,6 +1,7 @@
 """Estimation step by step: poses and boxes arrive one at a time, an estimate is wanted now."""
 
 from dqslam._core import OnlineOptions as OnlineOptions
+from dqslam._core import SmoothingLevel as SmoothingLevel
 from dqslam.online.objects import Objects as Objects
 from dqslam.online.polish import Polished as Polished
 from dqslam.online.relocalize import Relocation as Relocation
