@@ -4,7 +4,6 @@
 #include "bindings.h"
 #include "dqslam/online/relocalize.h"
 #include "dqslam/online/session.h"
-#include "keywords.h"
 
 namespace py = pybind11;
 using namespace pybind11::literals;
@@ -15,53 +14,71 @@ namespace {
 using online::NewLabels;
 using online::OnlineOptions;
 using online::Session;
+using online::SmoothingLevel;
 using online::StepObservations;
 using online::StepReport;
 
 void BindOptions(py::module_& m) {
+  py::class_<SmoothingLevel>(m, "SmoothingLevel", "A level of smoothing beside the window's.")
+      .def(py::init<int, int, int>(), "poses"_a, "every"_a, "iterations"_a)
+      .def_readwrite(
+          "poses", &SmoothingLevel::poses, "How many of the last poses are minimized together.")
+      .def_readwrite("every",
+                     &SmoothingLevel::every,
+                     "How many steps lie between two smoothings of this level.")
+      .def_readwrite("iterations",
+                     &SmoothingLevel::iterations,
+                     "How many Levenberg-Marquardt steps a smoothing takes.");
   py::class_<OnlineOptions>(m, "OnlineOptions", "What a caller of a session may choose.")
-      .def(py::init(&FromKeywords<OnlineOptions>), "Any of the attributes as keywords.")
-      .def("__repr__", &ShowChanges<OnlineOptions>)
-      .def_readwrite("window_poses", &OnlineOptions::window_poses, "Minimized at every step.")
+      .def(py::init([](const py::kwargs& values) {
+             py::object options = py::cast(OnlineOptions());
+             for (const auto& [name, value] : values) py::setattr(options, name, value);
+             return options.cast<OnlineOptions>();
+           }),
+           "Any of the attributes as keywords.")
+      .def_readwrite("window_poses",
+                     &OnlineOptions::window_poses,
+                     "How many of the last poses are minimized at every step.")
       .def_readwrite("window_iterations",
                      &OnlineOptions::window_iterations,
-                     "Levenberg-Marquardt steps of the window.")
-      .def_readwrite("recent_poses", &OnlineOptions::recent_poses, "Minimized now and then,")
-      .def_readwrite("recent_every", &OnlineOptions::recent_every, "each so many steps.")
-      .def_readwrite("lap_poses", &OnlineOptions::lap_poses, "Minimized rarely,")
-      .def_readwrite("lap_every", &OnlineOptions::lap_every, "each so many steps.")
-      .def_readwrite("smoothing_iterations",
-                     &OnlineOptions::smoothing_iterations,
-                     "Levenberg-Marquardt steps of these two.")
-      .def_readwrite("tour_poses", &OnlineOptions::tour_poses, "Minimized by one such step,")
-      .def_readwrite("tour_every", &OnlineOptions::tour_every, "each so many steps.")
+                     "How many Levenberg-Marquardt steps the window takes at every step.")
+      .def_readwrite("short_smoothing",
+                     &OnlineOptions::short_smoothing,
+                     "The level that repairs what the window froze too early.")
+      .def_readwrite("medium_smoothing",
+                     &OnlineOptions::medium_smoothing,
+                     "The level that is due more often while a session is young.")
+      .def_readwrite("long_smoothing",
+                     &OnlineOptions::long_smoothing,
+                     "The level that takes the place of a medium one when it is due.")
       .def_readwrite("loop_absence",
                      &OnlineOptions::loop_absence,
-                     "Poses without a observation before an object closes a loop.")
+                     "An object closes a loop when it is seen again after more poses than this.")
       .def_readwrite("loop_chi_square",
                      &OnlineOptions::loop_chi_square,
-                     "Of the window, per residual: the loop does not fit.")
+                     "A loop does not fit when the window's chi-square per residual is above this.")
       .def_readwrite("loop_iterations",
                      &OnlineOptions::loop_iterations,
-                     "Levenberg-Marquardt steps over a loop.")
+                     "How many Levenberg-Marquardt steps a loop that does not fit takes.")
       .def_readwrite("misfit_chi_square",
                      &OnlineOptions::misfit_chi_square,
-                     "Of the window, per residual: its objects start again.")
+                     "The last poses and their objects start again when the window's chi-square "
+                     "per residual is above this.")
       .def_readwrite("recover_every",
                      &OnlineOptions::recover_every,
-                     "Steps between two such starts, at least.")
+                     "How many steps lie at least between two such starts.")
       .def_readwrite("loss_scale",
                      &OnlineOptions::loss_scale,
-                     "Of a Cauchy loss on boxes, sigmas of a box; 0: least squares.");
+                     "The scale of a Cauchy loss on whole boxes, in sigmas; 0 stands for least "
+                     "squares.");
 }
 
 void BindReport(py::module_& m) {
   py::class_<StepReport>(m, "StepReport", "What a step cost.")
-      .def("__repr__", &ShowChanges<StepReport>)
       .def_readonly("pose", &StepReport::pose, "Row of the new pose.")
       .def_readonly("first_observation",
                     &StepReport::first_observation,
-                    "Row of the first it saw: boxes as they were given, then positions.")
+                    "Row of its first observation: boxes as they were given, then positions.")
       .def_readonly("window_poses", &StepReport::window_poses, "Poses of the window.")
       .def_readonly("window_objects", &StepReport::window_objects, "Objects that it saw.")
       .def_readonly("linearized",
@@ -79,8 +96,33 @@ void BindReport(py::module_& m) {
       .def_readonly("smoothed_observations",
                     &StepReport::smoothed_observations,
                     "Observations linearized there.")
-      .def_readonly("closed_loop", &StepReport::closed_loop)
-      .def_readonly("recovered", &StepReport::recovered, "Young objects were started again.");
+      .def_readonly("closed_loop", &StepReport::closed_loop, "A loop that did not fit was solved.")
+      .def_readonly("recovered",
+                    &StepReport::recovered,
+                    "The last poses and their young objects were started again.");
+}
+
+void BindObservations(py::module_& m) {
+  py::class_<StepObservations>(m, "StepObservations", "What one pose saw.")
+      .def(py::init<IndexVector,
+                    RowMatrix,
+                    RowMatrix,
+                    BoolTable,
+                    std::vector<MeasurementTable>,
+                    Eigen::VectorXd,
+                    Eigen::VectorXd>(),
+           py::kw_only(),
+           "object"_a,
+           "box"_a,
+           "covariance"_a,
+           "truncated"_a,
+           "measurements"_a = std::vector<MeasurementTable>(),
+           "log_size_mean"_a = Eigen::VectorXd(),
+           "log_size_sigma"_a = Eigen::VectorXd(),
+           "Boxes (n, 4) in undistorted pixels with covariances (n, 16), edges cut by the image "
+           "border (n, 4) and the row of the object of each (n,); measurements, one table a kind, "
+           "whose poses are not used; size priors of the new objects. Rows from num_objects on "
+           "are new objects, in order. A box of object -1 waits and takes no part.");
 }
 
 void BindSession(py::module_& m) {
@@ -90,48 +132,14 @@ void BindSession(py::module_& m) {
            "camera"_a,
            "scene_priors"_a = ScenePriors(),
            "options"_a = OnlineOptions())
-      .def(
-          "add",
-          [](Session& session,
-             const Eigen::VectorXd& relative,
-             const RowMatrix& covariance,
-             const IndexVector& object,
-             const RowMatrix& box,
-             const RowMatrix& box_covariance,
-             const BoolTable& truncated,
-             const IndexVector& position_object,
-             const RowMatrix& position,
-             const RowMatrix& position_covariance,
-             const Eigen::VectorXd& log_size_mean,
-             const Eigen::VectorXd& log_size_sigma) {
-            const py::gil_scoped_release no_gil;
-            return session.Add(relative,
-                               covariance,
-                               StepObservations{object,
-                                                box,
-                                                box_covariance,
-                                                truncated,
-                                                position_object,
-                                                position,
-                                                position_covariance,
-                                                log_size_mean,
-                                                log_size_sigma});
-          },
-          "relative"_a,
-          "covariance"_a,
-          "object"_a,
-          "box"_a,
-          "box_covariance"_a,
-          "truncated"_a,
-          "position_object"_a,
-          "position"_a,
-          "position_covariance"_a,
-          "log_size_mean"_a,
-          "log_size_sigma"_a,
-          "Add a pose and what it saw: covariance (k, k), boxes (n, 4) with covariances (n, 16), "
-          "positions (p, 3) with covariances (p, 9), size priors of the new objects. A box of "
-          "object -1 waits and takes no part. The first pose's relative is the pose itself, exact "
-          "if its covariance is empty.")
+      .def("add",
+           &Session::Add,
+           "relative"_a,
+           "covariance"_a,
+           "observations"_a,
+           py::call_guard<py::gil_scoped_release>(),
+           "Add a pose and what it saw; covariance (k, k). The first pose's relative is the pose "
+           "itself, which is exact if its covariance is empty.")
       .def(
           "relabel",
           [](Session& session,
@@ -150,8 +158,8 @@ void BindSession(py::module_& m) {
           "log_size_mean"_a = Eigen::VectorXd(),
           "log_size_sigma"_a = Eigen::VectorXd(),
           "Give boxes (n,), by the rows of their observations, to other objects (n,): -1 waits, "
-          "num_objects "
-          "+ i is a new object that starts from ellipsoid (m, 9), log-Cholesky, in the world.")
+          "num_objects + i is a new object that starts from ellipsoid (m, 9), log-Cholesky, in the "
+          "world.")
       .def("scale_odometry",
            &Session::ScaleOdometry,
            "translation"_a,
@@ -243,8 +251,8 @@ void BindRelocalize(py::module_& m) {
       "candidates"_a,
       "fewest"_a,
       "Find the pose from boxes (b, 4) of objects (o, 9), with covariances (o, 81) and (b, 16); "
-      "the "
-      "candidates of a box are rows of objects that it may show. ValueError where there is none.");
+      "the candidates of a box are rows of objects that it may show. ValueError where there is "
+      "none.");
 }
 
 }  // namespace
@@ -253,6 +261,7 @@ void BindOnline(py::module_& m) {
   BindRelocalize(m);
   BindOptions(m);
   BindReport(m);
+  BindObservations(m);
   BindSession(m);
 }
 

@@ -29,6 +29,7 @@ if TYPE_CHECKING:  # the one list of public names, a line each: lazy_exports rea
     from dqslam._core import Residual as Residual
     from dqslam._core import ScenePriors as ScenePriors
     from dqslam._core import Schedule as Schedule
+    from dqslam._core import SmoothingLevel as SmoothingLevel
     from dqslam._core import SolveOptions as SolveOptions
     from dqslam._core import Start as Start
     from dqslam._core import State as State
@@ -59,6 +60,7 @@ if TYPE_CHECKING:  # the one list of public names, a line each: lazy_exports rea
     from dqslam.online import Step as Step
     from dqslam.online import StepBoxes as StepBoxes
     from dqslam.online import StepError as StepError
+    from dqslam.online import StepMeasurements as StepMeasurements
     from dqslam.online import StepPositions as StepPositions
     from dqslam.online import steps_of as steps_of
     from dqslam.pipeline import RunFilesOptions as RunFilesOptions

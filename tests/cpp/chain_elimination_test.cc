@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-namespace dqslam::online {
+namespace dqslam {
 namespace {
 
 // A random chain with objects that come, go and share places in the front, beside the same normal
@@ -102,36 +102,36 @@ class ChainTest {
   double damping_;
   bool solved_ = true;
   std::mt19937 random_{7};
-  Chain<k> chain_;
+  ChainElimination<k> chain_;
   Eigen::MatrixXd H_ = Eigen::MatrixXd::Zero(kSize, kSize);
   Eigen::VectorXd g_ = Eigen::VectorXd::Zero(kSize);
 };
 
-TEST(Chain, SolvesTheNormalEquationsOfThePlane) {
+TEST(ChainElimination, SolvesTheNormalEquationsOfThePlane) {
   ChainTest<3>(0).ExpectDenseSolution();
 }
 
-TEST(Chain, SolvesTheNormalEquationsOfSpace) {
+TEST(ChainElimination, SolvesTheNormalEquationsOfSpace) {
   ChainTest<6>(0).ExpectDenseSolution();
 }
 
-TEST(Chain, DampsEveryDiagonalEntry) {
+TEST(ChainElimination, DampsEveryDiagonalEntry) {
   ChainTest<3>(0.3).ExpectDenseSolution();
 }
 
-TEST(Chain, RefusesAPoseThatNothingDetermines) {
-  Chain<3> chain;
+TEST(ChainElimination, RefusesAPoseThatNothingDetermines) {
+  ChainElimination<3> chain;
   chain.Reset(0);
   const Eigen::Matrix3d zero = Eigen::Matrix3d::Zero();
   EXPECT_FALSE(chain.NextPose(Eigen::Vector3d::Zero(), zero, zero));
 }
 
-TEST(Chain, RefusesNaN) {
-  Chain<3> chain;
+TEST(ChainElimination, RefusesNaN) {
+  ChainElimination<3> chain;
   chain.Reset(0);
   const Eigen::Matrix3d nan = Eigen::Matrix3d::Constant(std::nan(""));
   EXPECT_FALSE(chain.NextPose(Eigen::Vector3d::Zero(), nan, nan));
 }
 
 }  // namespace
-}  // namespace dqslam::online
+}  // namespace dqslam

@@ -3,6 +3,7 @@
 #include <random>
 
 #include "dqslam/costs/box.h"
+#include "dqslam/costs/measurements.h"
 #include "dqslam/costs/size_prior.h"
 #include "dqslam/online/linearize.h"
 
@@ -33,7 +34,7 @@ typename History<Pose>::Storage MakePose() {
   return pose;
 }
 
-Vector9d MakeChart(double distance) {
+Vector9d MakeObject(double distance) {
   return CenterShapeFromEllipsoid(EllipsoidFromAxes(
       {-1, distance, 1.6}, {0.6, 0.4, 0.3}, Eigen::Vector4d(0.1, 0.2, 0.3, 0.9).normalized()));
 }
@@ -43,12 +44,12 @@ template <typename Pose>
 void ExpectDerivatives(double distance, bool is_box, bool truncated) {
   const Model model(MakeCamera(), ScenePriors(), 0);
   const auto pose = MakePose<Pose>();
-  const Vector9d center_shape = MakeChart(distance);
+  const Vector9d center_shape = MakeObject(distance);
   std::mt19937 random(3);
   std::normal_distribution<double> normal;
   for (int draw = 0; draw < 6; ++draw) {
     Observation observation{};
-    observation.is_box = is_box;
+    observation.kind = is_box ? Observation::kBox : MeasurementKind("position");
     observation.value << 250, 200, 380, 290;
     if (!is_box) observation.value << 1, 2, 3, 0;
     for (int i = 0; i < 4; ++i) observation.value[i] += (is_box ? 20 : 1) * normal(random);
@@ -60,8 +61,8 @@ void ExpectDerivatives(double distance, bool is_box, bool truncated) {
     const auto station = [&](const typename History<Pose>::Storage& at) {
       return Station::At<Pose>(at.data(), model.mount);
     };
-    Linear<Pose> linear;
-    Linearize<Pose>(model, station(pose), observation, center_shape, Edges::kBox, &linear);
+    LinearizedObservation<Pose> linear;
+    Linearize<Pose>(model, station(pose), observation, center_shape, EdgeResidual::kBox, &linear);
     double unused;
     EXPECT_NEAR(linear.cost,
                 CostOfObservation<Pose>(
@@ -121,12 +122,11 @@ TEST(Linearize, IsTheBoxCost) {
   const Camera camera = MakeCamera();
   const Model model(camera, ScenePriors(), 0);
   const auto pose = MakePose<Se3>();
-  const Vector9d center_shape = MakeChart(6);
+  const Vector9d center_shape = MakeObject(6);
   Vector9d ellipsoid;
   EllipsoidFromCenterShape(center_shape.data(), ellipsoid.data());
   Observation observation{};
   observation.value << 250, 200, 380, 290;
-  observation.is_box = true;
   observation.sqrt_information = Eigen::Vector4d(1, 2, 3, 4).asDiagonal();
   observation.truncated.setConstant(false);
   const BoxCost<Se3, EllipsoidModel> cost{{},
@@ -137,26 +137,44 @@ TEST(Linearize, IsTheBoxCost) {
                                           observation.truncated};
   Eigen::Vector4d expected;
   ASSERT_TRUE(cost(pose.data(), ellipsoid.data(), expected.data()));
-  Linear<Se3> linear;
+  LinearizedObservation<Se3> linear;
   const Station station = Station::At<Se3>(pose.data(), model.mount);
-  Linearize<Se3>(model, station, observation, center_shape, Edges::kBox, &linear);
+  Linearize<Se3>(model, station, observation, center_shape, EdgeResidual::kBox, &linear);
   EXPECT_LT((linear.residual - expected).norm(), 1e-9);
+}
+
+// An error of zero is no sign that an edge does not count: each pulls at the object as soon as it
+// moves.
+TEST(Linearize, EdgesThatFitExactlyHaveDerivatives) {
+  const Model model(MakeCamera(), ScenePriors(), 0);
+  const auto pose = MakePose<Se3>();
+  const Vector9d center_shape = MakeObject(6);
+  const Station station = Station::At<Se3>(pose.data(), model.mount);
+  Observation observation{};
+  observation.sqrt_information.setIdentity();
+  observation.truncated << true, false, false, false;
+  ASSERT_TRUE(ProjectToBox(
+      ToCamera(station.camera, SurfaceOf(center_shape)), model.camera, &observation.value));
+  LinearizedObservation<Se3> linear;
+  Linearize(model, station, observation, center_shape, EdgeResidual::kBox, &linear);
+  EXPECT_EQ(linear.residual.norm(), 0);
+  EXPECT_GT(linear.by_object.rowwise().norm().minCoeff(), 10);
+  EXPECT_GT(linear.by_pose.rowwise().norm().minCoeff(), 10);
 }
 
 // Half of c^2 log(1 + s / c^2), and the gradient that goes with it.
 TEST(Linearize, WeighsByTheCauchyLoss) {
   const Model plain(MakeCamera(), ScenePriors(), 0), robust(MakeCamera(), ScenePriors(), 2);
   const auto pose = MakePose<Se2>();
-  const Vector9d center_shape = MakeChart(6);
+  const Vector9d center_shape = MakeObject(6);
   Observation observation{};
-  observation.is_box = true;
   observation.value << 250, 200, 380, 290;
   observation.sqrt_information.setIdentity();
   observation.truncated.setConstant(false);
-  Linear<Se2> all, weighed;
+  LinearizedObservation<Se2> all, weighed;
   const Station station = Station::At<Se2>(pose.data(), plain.mount);
-  Linearize<Se2>(plain, station, observation, center_shape, Edges::kBox, &all);
-  Linearize<Se2>(robust, station, observation, center_shape, Edges::kBox, &weighed);
+  Linearize<Se2>(plain, station, observation, center_shape, EdgeResidual::kBox, &all);
+  Linearize<Se2>(robust, station, observation, center_shape, EdgeResidual::kBox, &weighed);
   const double s = all.residual.squaredNorm();
   EXPECT_NEAR(weighed.cost, 0.5 * 4 * std::log1p(s / 4), 1e-9);
   const Vector9d expected = all.by_object.transpose() * all.residual / (1 + s / 4);
@@ -164,23 +182,23 @@ TEST(Linearize, WeighsByTheCauchyLoss) {
             1e-9 * expected.norm());
 }
 
-TEST(Chart, ThereAndBack) {
+TEST(CenterShape, ThereAndBack) {
   Vector9d ellipsoid;
-  const Vector9d center_shape = MakeChart(6);
+  const Vector9d center_shape = MakeObject(6);
   EllipsoidFromCenterShape(center_shape.data(), ellipsoid.data());
   EXPECT_LT((CenterShapeFromEllipsoid(ellipsoid) - center_shape).norm(), 1e-12);
 }
 
-TEST(Chart, MovesInAStraightLineWhileItCan) {
-  const Vector9d center_shape = MakeChart(6);
+TEST(CenterShape, MovesInAStraightLineWhileItCan) {
+  const Vector9d center_shape = MakeObject(6);
   Vector9d moved;
   const Vector9d small = 1e-3 * Vector9d::Ones();
-  ASSERT_TRUE(Move(center_shape, small, &moved));
+  ASSERT_TRUE(RetractCenterShape(center_shape, small, &moved));
   EXPECT_LT((moved - center_shape - small).norm(), 1e-9);
   // Far beyond the cone of ellipsoids it bends, and stays one.
   Vector9d large = Vector9d::Zero();
   large[3] = -5;
-  ASSERT_TRUE(Move(center_shape, large, &moved));
+  ASSERT_TRUE(RetractCenterShape(center_shape, large, &moved));
   EXPECT_GT(ShapeOf(moved.data()).determinant(), 0);
 }
 
@@ -210,7 +228,7 @@ TEST(Steps, CostByHand) {
   step.sqrt_information = Eigen::Vector3d(10, 10, 10).asDiagonal();
   const Eigen::Vector3d from(0, 0, M_PI / 2), to(0, 1.1, M_PI / 2);
   EXPECT_NEAR(CostOfStep<Se2>(step, from.data(), to.data()), 0.5, 1e-9);
-  const LinearStep<Se2> linear = LinearizeStep<Se2>(step, from.data(), to.data());
+  const LinearizedStep<Se2> linear = LinearizeStep<Se2>(step, from.data(), to.data());
   EXPECT_NEAR(linear.residual.squaredNorm(), 1, 1e-9);
   // Both tangents are in the frames of their poses: pushing both ahead changes nothing.
   EXPECT_LT((linear.by_from.col(0) + linear.by_to.col(0)).norm(), 1e-9);

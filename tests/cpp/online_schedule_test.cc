@@ -13,9 +13,9 @@ WindowFit Window(int end, double chi_square = 1, int undefined = 0) {
   return {end - 10, end, chi_square, undefined};
 }
 
-TEST(Schedule, LapsAndToursOfALongSession) {
+TEST(Schedule, LevelsOfALongSession) {
   Schedule schedule{OnlineOptions()};
-  int recent = 0, laps = 0, tours = 0, last_lap = 0;
+  int short_ones = 0, medium_ones = 0, long_ones = 0, last_end = 0;
   for (int end = 1; end <= 4096; ++end) {
     const Smoothing smoothing = schedule.Choose(Window(end));
     EXPECT_FALSE(smoothing.closes_loop);
@@ -23,45 +23,67 @@ TEST(Schedule, LapsAndToursOfALongSession) {
     if (end <= 640) continue;
     const int poses = end - smoothing.begin;
     if (poses == 64) {
-      ++recent;
+      ++short_ones;
       EXPECT_EQ(end % 16, 0);
       EXPECT_EQ(smoothing.iterations, 5);
       continue;
     }
-    EXPECT_EQ(end - last_lap, last_lap > 0 ? 128 : end);
-    last_lap = end;
+    EXPECT_EQ(end - last_end, last_end > 0 ? 128 : end);
+    last_end = end;
     if (smoothing.iterations == 1) {
-      ++tours;
+      ++long_ones;
       EXPECT_EQ(poses, std::min(end, 2048));
     } else {
-      ++laps;
+      ++medium_ones;
       EXPECT_EQ(poses, 640);
       EXPECT_EQ(smoothing.iterations, 5);
     }
   }
-  // 27 in 3456 steps, of which each fourth is a tour.
-  EXPECT_EQ(laps + tours, 27);
-  EXPECT_NEAR(tours, 27 / 4.0, 1);
-  EXPECT_GE(recent, 3456 / 16 - 27);
+  // 27 in 3456 steps, of which each fourth is a long one.
+  EXPECT_EQ(medium_ones + long_ones, 27);
+  EXPECT_NEAR(long_ones, 27 / 4.0, 1);
+  EXPECT_GE(short_ones, 3456 / 16 - 27);
 }
 
 // A young session minimizes all of itself whenever it has grown by a quarter, at first each 16.
-TEST(Schedule, LapsOfAYoungSession) {
+TEST(Schedule, MediumSmoothingsOfAYoungSession) {
   Schedule schedule{OnlineOptions()};
-  std::vector<int> laps;
+  std::vector<int> ends;
   for (int end = 1; end <= 128; ++end) {
     const Smoothing smoothing = schedule.Choose(Window(end));
-    if (smoothing.begin == 0 && end > 10) laps.push_back(end);
+    if (smoothing.begin == 0 && end > 10) ends.push_back(end);
   }
-  EXPECT_EQ(laps, (std::vector<int>{16, 32, 48, 64, 80, 100, 125}));
+  EXPECT_EQ(ends, (std::vector<int>{16, 32, 48, 64, 80, 100, 125}));
 }
 
-TEST(Schedule, LapsAreShorterWhereManyObjectsAre) {
+TEST(Schedule, EachLevelHasItsNumbers) {
+  OnlineOptions options;
+  options.short_smoothing = {20, 7, 2};
+  options.medium_smoothing = {50, 35, 3};
+  options.long_smoothing = {90, 70, 4};
+  Schedule schedule{options};
+  std::vector<std::vector<int>> smoothings;  // end, poses, iterations
+  for (int end = 1; end <= 191; ++end) {
+    const Smoothing one = schedule.Choose(Window(end));
+    if (end > 170 || one.iterations == 4)
+      smoothings.push_back({end, end - one.begin, one.iterations});
+  }
+  smoothings.erase(
+      std::remove_if(
+          smoothings.begin(), smoothings.end(), [](const auto& one) { return one[1] == 10; }),
+      smoothings.end());
+  EXPECT_EQ(
+      smoothings,
+      (std::vector<std::vector<int>>{
+          {80, 80, 4}, {156, 90, 4}, {175, 20, 2}, {182, 20, 2}, {189, 20, 2}, {191, 50, 3}}));
+}
+
+TEST(Schedule, SmoothingsAreShorterWhereManyObjectsAre) {
   Schedule schedule{OnlineOptions()};
-  schedule.SmoothedWith(640, 80);  // twice as many as a lap has room for: a quarter of the poses
+  schedule.SmoothedWith(640, 80);  // twice as many as there is room for: a quarter of the poses
   EXPECT_EQ(1000 - schedule.Choose(Window(1000)).begin, 512);
   EXPECT_EQ(1128 - schedule.Choose(Window(1128)).begin, 160);
-  schedule.SmoothedWith(640, 1000);  // never fewer than are recent
+  schedule.SmoothedWith(640, 1000);  // never fewer than a short one has
   EXPECT_EQ(1256 - schedule.Choose(Window(1256)).begin, 64);
 }
 
@@ -87,14 +109,14 @@ TEST(Schedule, ALoopIsWatchedForAsLongAsAWindow) {
   EXPECT_TRUE(schedule.Choose(Window(411, 9)).closes_loop);
 }
 
-TEST(Schedule, ALoopThatWasToldLateNeedsNoMisfitOfTheWindow) {
+TEST(Schedule, ALoopOfLateLabelsNeedsNoMisfitOfTheWindow) {
   Schedule schedule{OnlineOptions()};
   EXPECT_TRUE(schedule.WatchLoop(50, 290, 300));
   schedule.LoopDoesNotFit();
   EXPECT_EQ(schedule.Choose(Window(302)).begin, 50);
 }
 
-// Loops earn credit at the rate of laps, and can save three.
+// Loops earn credit at the rate of medium smoothings, and can save three.
 TEST(Schedule, LoopsAreRare) {
   Schedule schedule{OnlineOptions()};
   int closed = 0;

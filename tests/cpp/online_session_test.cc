@@ -225,7 +225,7 @@ TYPED_TEST(SessionTest, GoesOnWithTheNewLabels) {
   EXPECT_EQ(late->Observations(), early->Observations());
 }
 
-TYPED_TEST(SessionTest, AnObjectWithoutSightsKeepsItsRowAndItsPlace) {
+TYPED_TEST(SessionTest, AnObjectWithoutObservationsKeepsItsRowAndItsPlace) {
   const auto session = this->Fed(kNone);
   const auto never = this->Fed([&](int row) { return this->ObjectOf(row) == 4; });
   // Rows of the two sessions differ behind object 4's.
@@ -251,19 +251,19 @@ TYPED_TEST(SessionTest, WrongLabelsChangeNothing) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const auto good = [&] { return this->NewObject({0, 4, 8}, 5, 2); };
   std::vector<std::pair<NewLabels, std::string>> wrong(11, {good(), ""});
-  wrong[0].first.observation[1] = this->boxes(),
-  wrong[0].second = "observation row 1: no such observation";
-  wrong[1].first.observation[2] = -1, wrong[1].second = "observation row 2: no such observation";
+  wrong[0].first.observation[1] = this->boxes(), wrong[0].second = "observation row 1: unknown id";
+  wrong[1].first.observation[2] = -1, wrong[1].second = "observation row 2: unknown id -1";
   wrong[2].first.observation[2] = 0, wrong[2].second = "observation row 2: repeats row 0";
-  wrong[3].first.object[1] = 6, wrong[3].second = "object row 1: no such object";
-  wrong[4].first.object[0] = -2, wrong[4].second = "object row 0: no such object";
+  wrong[3].first.object[1] = 6, wrong[3].second = "object row 1: unknown id 6, there are 6";
+  wrong[4].first.object[0] = -2, wrong[4].second = "object row 0: unknown id -2";
   wrong[5].first.object.setConstant(-1);
-  wrong[5].second = "ellipsoid row 0: the new object is not seen";
+  wrong[5].second = "ellipsoid row 0: no box shows this object";
   wrong[6].first.ellipsoid(0, 4) = nan, wrong[6].second = "ellipsoid row 0: not a finite ellipsoid";
   wrong[7].first.ellipsoid(0, 3) = 800, wrong[7].second = "ellipsoid row 0: not a finite ellipsoid";
   wrong[8].first.log_size_sigma[0] = 0, wrong[8].second = "log_size_sigma row 0";
-  wrong[9].first.ellipsoid.resize(2, 9), wrong[9].second = "ellipsoid: expected 1 rows of 9";
-  wrong[10].first.object.resize(2), wrong[10].second = "object: expected one for each observation";
+  wrong[9].first.ellipsoid.resize(2, 9),
+      wrong[9].second = "ellipsoid has shape (2, 9), expected (1, 9)";
+  wrong[10].first.object.resize(2), wrong[10].second = "object has 2 entries, expected 3";
   const RowMatrix poses = session->Poses(), ellipsoids = session->Ellipsoids();
   const IndexVector observations = session->Observations();
   const double cost = session->Clone()->Smooth(5, 0);
@@ -301,7 +301,7 @@ TYPED_TEST(SessionTest, PositionsKeepTheirObject) {
   EXPECT_EQ(session->num_poses(), 2);
 }
 
-// The objects are out of observation for half of the drive, and only later told to be the same.
+// The objects are out of sight for half of the drive, and only later told to be the same.
 TYPED_TEST(SessionTest, ALoopThatIsToldLateIsClosed) {
   for (const double drift : {0.0, 0.02}) {
     this->scene_ = MakeScene<TypeParam>();

@@ -244,6 +244,20 @@ def test_a_wrong_box_pulls_less_with_a_loss(problem):
     assert errors[1] <= errors[0]
 
 
+def test_each_level_of_smoothing_is_an_option(problem):
+    options = dq.OnlineOptions(short_smoothing=dq.SmoothingLevel(20, 5, 2))
+    options.medium_smoothing.every = 60
+    assert options.medium_smoothing.every == 60
+    reports = []
+    slam = session(problem, online=options)
+    for step in list(steps_of(problem.recording))[:200]:
+        reports.append(slam.add(step.odometry, step.boxes))
+    short = [report.pose + 1 for report in reports if report.smoothed_poses == 20]
+    assert short[-5:] == [175, 180, 185, 190, 195]
+    with pytest.raises(ValueError, match="all must be positive"):
+        session(problem, online=dq.OnlineOptions(long_smoothing=dq.SmoothingLevel(0, 1, 1)))
+
+
 def test_positions_place_an_object(problem):
     slam = session(problem)
     box = StepBoxes([[594.5, 466.5, 684.5, 556.5]], [7])

@@ -8,6 +8,7 @@
 #include "dqslam/estimation/graduated.h"
 #include "dqslam/estimation/repair.h"
 #include "dqslam/geometry/dispatch.h"
+#include "dqslam/problem/checks.h"
 #include "dqslam/solver/linearize.h"
 
 namespace dqslam {
@@ -17,16 +18,6 @@ using Sparse = Eigen::SparseMatrix<double>;
 
 // The damping, relative to the diagonal of H.  It is far below the information of the data.
 constexpr double kDamping = 1e-12;
-
-void CheckState(const Graph& graph, const State& state) {
-  if (state.poses.rows() != graph.num_poses() || state.poses.cols() != graph.pose_size() ||
-      state.landmarks.rows() != graph.num_objects() || state.landmarks.cols() != kLandmarkSize ||
-      !state.poses.allFinite() || !state.landmarks.allFinite()) {
-    throw std::invalid_argument("state: need finite poses (" + std::to_string(graph.num_poses()) +
-                                ", " + std::to_string(graph.pose_size()) + ") and landmarks (" +
-                                std::to_string(graph.num_objects()) + ", 9)");
-  }
-}
 
 Stage StageOfInliers(const SolveContext& context, const State& state) {
   Stage stage = BatchStage(context);
@@ -152,7 +143,7 @@ Information ComputeInformation(const Graph& graph,
                                const SolveOptions& options,
                                const State& state) {
   const PreparedGraph prepared(graph, options.mode == Mode::kMapping);
-  CheckState(graph, state);
+  CheckState("state", graph, state);
   const Monitor no_monitor;
   const SolveContext context{prepared, options, no_monitor};
   const StageTerms terms = SelectTerms(context, StageOfInliers(context, state), state);

@@ -11,7 +11,7 @@ namespace dqslam {
 namespace {
 
 // An object is stuck if the median of its boxes is beyond this, or the mean beyond twice as much.
-constexpr double kImpossibleBox = 13.28;  // chi-square of 4 degrees of freedom, 99 %
+constexpr double kImpossibleBox = kBoxChiSquare99;
 constexpr double kImpossibleMean = 2 * kImpossibleBox;
 constexpr double kImpossibleSize = 21.1;  // chi-square of 3 degrees of freedom, 99.99 %
 constexpr double kTorn = 5;               // chi-square of odometry, per degree of freedom

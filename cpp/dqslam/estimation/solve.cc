@@ -8,6 +8,7 @@
 #include "dqslam/estimation/grow.h"
 #include "dqslam/estimation/repair.h"
 #include "dqslam/geometry/dispatch.h"
+#include "dqslam/problem/checks.h"
 
 namespace dqslam {
 namespace {
@@ -28,14 +29,7 @@ void ValidateOptions(const SolveOptions& options) {
 }
 
 void ValidateStart(const Graph& graph, const State& start) {
-  const bool shapes_match =
-      start.poses.rows() == graph.num_poses() && start.poses.cols() == graph.pose_size() &&
-      start.landmarks.rows() == graph.num_objects() && start.landmarks.cols() == kLandmarkSize;
-  if (!shapes_match || !start.poses.allFinite() || !start.landmarks.allFinite()) {
-    throw std::invalid_argument("start: need finite poses (" + std::to_string(graph.num_poses()) +
-                                ", " + std::to_string(graph.pose_size()) + ") and landmarks (" +
-                                std::to_string(graph.num_objects()) + ", 9)");
-  }
+  CheckState("start", graph, start);
   if (graph.pose_model == PoseModel::kSe3 &&
       ((start.poses.rightCols<4>().rowwise().norm().array() - 1).abs() > 1e-6).any()) {
     throw std::invalid_argument("start: the quaternions of the poses must be unit");

@@ -3,7 +3,7 @@
 #include "dqslam/geometry/jets.h"
 #include "dqslam/geometry/manifolds.h"
 
-namespace dqslam::online {
+namespace dqslam {
 namespace {
 
 // EllipsoidFromCenterShape() as a functor.
@@ -36,7 +36,7 @@ Vector9d CenterShapeFromEllipsoid(const Vector9d& ellipsoid) {
   return CenterShapeFromSurface(EllipsoidModel::Unpack(ellipsoid.data()));
 }
 
-bool Move(const Vector9d& center_shape, const Vector9d& step, Vector9d* result) {
+bool RetractCenterShape(const Vector9d& center_shape, const Vector9d& step, Vector9d* result) {
   // Against the smallest eigenvalue, by the determinant and the trace: no decomposition is needed
   // while the shape changes little.
   const Matrix3<double> S = ShapeOf(center_shape.data()), dS = ShapeOf(step.data());
@@ -58,4 +58,4 @@ Matrix9d InformationInCenterShape(const Vector9d& center_shape, const Matrix9d& 
   return jacobian.transpose() * of_ellipsoid * jacobian;
 }
 
-}  // namespace dqslam::online
+}  // namespace dqslam

@@ -1,14 +1,14 @@
-// Coordinates of an object in which information adds up.
+// Coordinates of an ellipsoid in which information adds up.
 //
-//   center_shape   [cx, cy, cz, S00, S01, S02, S11, S12, S22]: center and shape.  A Gaussian in it
-//   needs no
-//           transport when the object moves, and it is the space in which EllipsoidManifold goes
-//           straight.
+//   center_shape  [cx, cy, cz, S00, S01, S02, S11, S12, S22]: center and shape, in the world.
+//
+// A Gaussian in them needs no transport when the object moves: EllipsoidManifold goes straight in
+// these coordinates.
 #pragma once
 
 #include "dqslam/geometry/ellipsoid.h"
 
-namespace dqslam::online {
+namespace dqslam {
 
 template <typename T>
 Matrix3<T> ShapeOf(const T* center_shape) {
@@ -41,11 +41,11 @@ void EllipsoidFromCenterShape(const T* center_shape, T* ellipsoid) {
   ellipsoid[8] = l21;
 }
 
-/// center_shape + step, bent where that would not be an ellipsoid any more; false where rounding
-/// wins.
-bool Move(const Vector9d& center_shape, const Vector9d& step, Vector9d* result);
+/// center_shape + step, bent where the sum would not be an ellipsoid; false where rounding makes
+/// the result infinite or flat.
+bool RetractCenterShape(const Vector9d& center_shape, const Vector9d& step, Vector9d* result);
 
-/// Information in the center_shape from that in log-Cholesky parameters at the same object.
+/// Information in these coordinates, from that in log-Cholesky parameters of the same object.
 Matrix9d InformationInCenterShape(const Vector9d& center_shape, const Matrix9d& of_ellipsoid);
 
-}  // namespace dqslam::online
+}  // namespace dqslam

@@ -11,19 +11,19 @@
 #include <algorithm>
 #include <vector>
 
-#include "dqslam/geometry/center_shape.h"
+#include "dqslam/geometry/blocks.h"
 
-namespace dqslam::online {
+namespace dqslam {
 
 template <int k>
-class Chain {
+class ChainElimination {
  public:
   using Square = Eigen::Matrix<double, k, k>;
   using Column = Eigen::Matrix<double, k, 1>;
 
   /// Starts a new chain.  A damping lambda adds Marquardt's lambda diag(J^T J).
   void Reset(double damping) {
-    grow_ = 1 + damping;
+    damping_ = damping;
     used_ = 0;
     names_.clear();
     free_.clear();
@@ -56,11 +56,11 @@ class Chain {
 
   /// Adds information H and gradient g to the present pose, or to an object.
   void AddPose(const Square& H, const Column& g) {
-    Grown(H, front_.template block<k, k>(0, 0));
+    AddDamped(H, front_.template block<k, k>(0, 0));
     rhs_.template head<k>() -= g;
   }
   void AddObjectInformation(int slot, const Matrix9d& H, const Vector9d& g) {
-    Grown(H, front_.template block<9, 9>(At(slot), At(slot)));
+    AddDamped(H, front_.template block<9, 9>(At(slot), At(slot)));
     rhs_.template segment<9>(At(slot)) -= g;
   }
   /// Adds a residual between the present pose and an object.
@@ -85,18 +85,11 @@ class Chain {
 
   bool EliminateObject(int slot) {
     const int at = At(slot), behind = at + 9, size = k + 9 * used_;
-    const Eigen::LLT<Matrix9d> cholesky(Matrix9d(front_.template block<9, 9>(at, at)));
-    const Vector9d h = cholesky.matrixL().solve(Vector9d(rhs_.template segment<9>(at)));
-    if (cholesky.info() != Eigen::Success || !h.allFinite()) return false;
-    auto& panel = of_object_;
-    panel.resize(size, 9);
-    panel.topRows(at) = front_.block(at, 0, 9, at).transpose();
-    panel.middleRows(at, 9).setZero();
-    panel.bottomRows(size - behind) = front_.block(behind, at, size - behind, 9);
-    front_.block(at, 0, 9, size).setZero();
-    front_.block(behind, at, size - behind, 9).setZero();
-    rhs_.template segment<9>(at).setZero();
-    Downdate<9>(slot, cholesky, h, &panel);
+    of_object_.resize(size, 9);
+    of_object_.topRows(at) = front_.block(at, 0, 9, at).transpose();
+    of_object_.middleRows(at, 9).setZero();
+    of_object_.bottomRows(size - behind) = front_.block(behind, at, size - behind, 9);
+    if (!Eliminate(slot, at, &of_object_)) return false;
     free_.push_back(slot);
     return true;
   }
@@ -146,35 +139,33 @@ class Chain {
   int At(int slot) const { return k + 9 * slot; }
 
   template <typename H, typename Block>
-  void Grown(const H& information, Block&& block) {
+  void AddDamped(const H& information, Block&& block) {
     block += information;
-    block.diagonal() += (grow_ - 1) * information.diagonal();
+    block.diagonal() += damping_ * information.diagonal();
   }
 
   // Eliminates the present pose; `to_next` couples it to the next pose and is null for the last.
   bool EliminatePose(const Square* to_next) {
     const int m = 9 * used_;
-    const Eigen::LLT<Square> cholesky(Square(front_.template topLeftCorner<k, k>()));
-    const Column h = cholesky.matrixL().solve(Column(rhs_.template head<k>()));
-    if (cholesky.info() != Eigen::Success || !h.allFinite()) return false;
-    auto& panel = of_pose_;
-    panel.resize(k + m, k);
-    panel.template topRows<k>() = to_next ? Square(to_next->transpose()) : Square::Zero();
-    panel.bottomRows(m) = front_.block(k, 0, m, k);
-    front_.block(0, 0, k + m, k).setZero();
-    rhs_.template head<k>().setZero();
-    Downdate<k>(-1, cholesky, h, &panel);
-    return true;
+    of_pose_.resize(k + m, k);
+    of_pose_.template topRows<k>() = to_next ? Square(to_next->transpose()) : Square::Zero();
+    of_pose_.bottomRows(m) = front_.block(k, 0, m, k);
+    return Eliminate(-1, 0, &of_pose_);
   }
 
   // Subtracts the Schur complement of the eliminated variable from the front; `panel` couples the
   // two.
   template <int n>
-  void Downdate(int slot,
-                const Eigen::LLT<Eigen::Matrix<double, n, n>>& cholesky,
-                const Eigen::Matrix<double, n, 1>& h,
-                Eigen::Matrix<double, Eigen::Dynamic, n>* panel) {
+  bool Eliminate(int slot, int at, Eigen::Matrix<double, Eigen::Dynamic, n>* panel) {
     const int size = static_cast<int>(panel->rows());
+    const Eigen::LLT<Eigen::Matrix<double, n, n>> cholesky(
+        Eigen::Matrix<double, n, n>(front_.template block<n, n>(at, at)));
+    const Eigen::Matrix<double, n, 1> h =
+        cholesky.matrixL().solve(Eigen::Matrix<double, n, 1>(rhs_.template segment<n>(at)));
+    if (cholesky.info() != Eigen::Success || !h.allFinite()) return false;
+    front_.block(at, 0, n, size).setZero();
+    front_.block(at, at, size - at, n).setZero();
+    rhs_.template segment<n>(at).setZero();
     cholesky.matrixU().template solveInPlace<Eigen::OnTheRight>(*panel);
     for (int column = 0; column < size; ++column) {
       const Eigen::Matrix<double, n, 1> factor = panel->row(column).transpose();
@@ -188,6 +179,7 @@ class Chain {
     arena_.insert(arena_.end(), L, L + n * n);
     arena_.insert(arena_.end(), h.data(), h.data() + n);
     arena_.insert(arena_.end(), panel->data(), panel->data() + n * size);
+    return true;
   }
 
   // x = L^-T (h - panel^T x_front)
@@ -203,7 +195,7 @@ class Chain {
     return x;
   }
 
-  double grow_ = 1;
+  double damping_ = 0;
   int used_ = 0;
   std::vector<int> names_;  ///< of the objects, by slot
   std::vector<int> free_;
@@ -216,4 +208,4 @@ class Chain {
   Eigen::Matrix<double, Eigen::Dynamic, 9> of_object_;
 };
 
-}  // namespace dqslam::online
+}  // namespace dqslam

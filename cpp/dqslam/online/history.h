@@ -1,33 +1,65 @@
-// All that a session has been told, and where it stands: tables that only grow at their ends.
+// All that a session was given, and where it stands: tables that only grow at their ends.
 #pragma once
 
+#include <algorithm>
 #include <vector>
 
 #include "dqslam/estimation/initialize.h"
+#include "dqslam/geometry/box_derivatives.h"
 #include "dqslam/geometry/center_shape.h"
-#include "dqslam/geometry/pose.h"
+#include "dqslam/problem/graph.h"
 
 namespace dqslam::online {
 
-/// What one image, or one depth measurement, says of one object.
-struct Observation {
-  int pose;
-  int object;                        ///< -1 for a box that waits: it takes no part
-  Eigen::Vector4d value;             ///< box [px], or the center in the robot frame [m] and a zero
-  Eigen::Matrix4d sqrt_information;  ///< whitens the error; of a center, zero in the last row
-  EdgeFlags truncated = EdgeFlags::Constant(false);
-  bool is_box = true;
-  int kind = 0;  ///< of a measurement that is no box, see costs/measurements.h
-
-  bool Waits() const { return object < 0; }
+/// What all residuals share.
+struct Model {
+  Model(const Camera& camera, const ScenePriors& scene, double loss_scale)
+      : camera(camera), mount(camera), scene(scene), loss_scale(loss_scale) {}
+  Camera camera;
+  Mount mount;
+  ScenePriors scene;
+  double loss_scale;  ///< of the Cauchy loss, sigmas of a whole box; 0 for least squares
 };
 
-/// A Gaussian in the center_shape: cost + g.d + d.H d / 2 at a distance d from `origin`.
+/// A box of an object, or another measurement of it.
+struct Observation {
+  static constexpr int kBox = -1;
+
+  int pose;
+  int object;                        ///< -1 for a box that waits: it takes no part
+  int kind = kBox;                   ///< else one of costs/measurements.h, of m numbers
+  Eigen::Vector4d value;             ///< box [px], or what was measured, and zeros
+  Eigen::Matrix4d sqrt_information;  ///< whitens the error; zero beyond m rows and columns
+  EdgeFlags truncated = EdgeFlags::Constant(false);
+
+  bool IsBox() const { return kind == kBox; }
+
+  bool Waits() const { return object < 0; }
+
+  void SetMeasurement(int new_kind, const Eigen::VectorXd& measured, const RowMatrix& whitening) {
+    const Eigen::Index m = measured.size();
+    kind = new_kind;
+    value.setZero();
+    value.head(m) = measured;
+    sqrt_information.setZero();
+    sqrt_information.topLeftCorner(m, m) = whitening;
+  }
+};
+
+/// A Gaussian in center and shape: cost + g.d + d.H d / 2 at a distance d from `origin`.
 struct GaussianPrior {
   Vector9d origin = Vector9d::Zero();
   Matrix9d H = Matrix9d::Zero();
   Vector9d g = Vector9d::Zero();
   double cost = 0;  ///< at the origin
+
+  double CostAt(const Vector9d& center_shape) const {
+    const Vector9d d = center_shape - origin;
+    return cost + g.dot(d) + 0.5 * d.dot(H * d);
+  }
+  Vector9d GradientAt(const Vector9d& center_shape) const {
+    return g + H * (center_shape - origin);
+  }
 };
 
 struct Object {
@@ -37,9 +69,11 @@ struct Object {
   std::vector<int> observations;  ///< rows, ascending
   // What observations say from poses that lie before the window, poses held fixed.
   GaussianPrior marginal;
-  int marginalized_observations = 0;  ///< how many of `observations` are in it
-  int linearized = 0;                 ///< of them, when all were linearized last
-  bool is_stale = true;
+  int marginalized = 0;  ///< how many of `observations` are in it
+  int relinearized = 0;  ///< how many of them there were when all were linearized last
+  bool is_stale = true;  ///< poses or labels have changed since: all are to be linearized anew
+
+  bool IsOfMap() const { return !map.H.isZero(0); }
 };
 
 template <typename Pose>
@@ -54,6 +88,9 @@ struct History {
     int first_observation;  ///< row of the first observation from this pose
   };
 
+  explicit History(const Model& model) : model(model) {}
+
+  Model model;
   std::vector<Storage> poses;
   std::vector<Step> steps;  ///< one a pose; of the first pose, its prior
   std::vector<Observation> observations;
@@ -61,9 +98,70 @@ struct History {
   bool first_pose_is_known = true;
 
   int num_poses() const { return static_cast<int>(poses.size()); }
+  int num_objects() const { return static_cast<int>(objects.size()); }
+  int num_observations() const { return static_cast<int>(observations.size()); }
+
   int ObservationsBefore(int pose) const {
-    return pose < num_poses() ? steps[pose].first_observation
-                              : static_cast<int>(observations.size());
+    return pose < num_poses() ? steps[pose].first_observation : num_observations();
+  }
+
+  /// Rows of the objects that are seen from the poses from `begin` on, each once.
+  std::vector<int> ObjectsSeenFrom(int begin) const {
+    std::vector<int> rows;
+    std::vector<bool> is_listed(objects.size(), false);
+    for (int row = ObservationsBefore(begin); row < num_observations(); ++row) {
+      const int object = observations[row].object;
+      if (object < 0 || is_listed[object]) continue;
+      is_listed[object] = true;
+      rows.push_back(object);
+    }
+    return rows;
+  }
+
+  /// What the derivatives of an observation need of a pose.
+  Station StationAt(int pose) const { return Station::At<Pose>(poses[pose].data(), model.mount); }
+
+  static Storage Compose(const Storage& from, const Storage& relative) {
+    Storage to;
+    Pose::Compose(from.data(), relative.data(), to.data());
+    Pose::Normalize(to.data());
+    return to;
+  }
+
+  static Storage Retract(const Storage& from,
+                         const Eigen::Matrix<double, Pose::kTangentSize, 1>& step) {
+    Storage relative;
+    Pose::FromTangent(step.data(), relative.data());
+    return Compose(from, relative);
+  }
+
+  /// Puts poses from `begin` on where their odometry leads from the pose before.
+  void DeadReckon(int begin) {
+    for (int pose = std::max(begin, 1); pose < num_poses(); ++pose)
+      poses[pose] = Compose(poses[pose - 1], steps[pose].relative);
+  }
+
+  /// Brings up to date what an object keeps of its observations before the pose `begin`: new ones
+  /// are added, and all are linearized anew where the object is stale or they have grown by a
+  /// quarter.  Returns how many were linearized.  In marginal_prior.cc.
+  int UpdateMarginalPrior(int begin, Object* object) const;
+
+  /// Takes over what was estimated elsewhere of the first poses and objects, log-Cholesky; later
+  /// ones move rigidly with the last of these poses.  Throws std::invalid_argument, and then
+  /// nothing has changed.  In merge.cc.
+  void Merge(const RowMatrix& estimated_poses, const RowMatrix& ellipsoids);
+
+  /// A problem for Solve().  Objects without a box take no part: `rows` has the row here of each
+  /// that does.  In to_graph.cc.
+  Graph ToGraph(std::vector<int>* rows) const;
+
+  /// How many boxes show each object.
+  IndexVector BoxCounts() const {
+    IndexVector counts = IndexVector::Zero(num_objects());
+    for (const Observation& one : observations) {
+      if (one.IsBox() && !one.Waits()) ++counts[one.object];
+    }
+    return counts;
   }
 };
 

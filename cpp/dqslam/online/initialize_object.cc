@@ -2,156 +2,117 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+
+#include "dqslam/online/levenberg_marquardt.h"
+#include "dqslam/online/linearize.h"
 
 namespace dqslam::online {
 namespace {
 
-constexpr int kRefineIterations = 6;
-// What a observation costs beside its tangent residual while its object is not in front.
-constexpr double kUndefinedCost = 50;
-
-template <typename Pose>
-std::vector<View> ViewsOf(const Model& model, const History<Pose>& history, const Object& object) {
-  std::vector<View> views;
-  for (const int row : object.observations) {
-    const Observation& observation = history.observations[row];
-    if (!observation.is_box) continue;
-    const Station station = Station::At<Pose>(history.poses[observation.pose].data(), model.mount);
-    views.push_back(
-        {station.camera, observation.value, observation.sqrt_information, observation.truncated});
-  }
-  return views;
-}
-
-// Derivatives at a center_shape, and the residuals that were used.
-template <typename Pose>
-double LinearizeAt(const Model& model,
-                   const History<Pose>& history,
-                   const Object& object,
-                   const Vector9d& center_shape,
-                   GaussianPrior* sum,
-                   std::vector<double>* depths) {
-  double cost = AddPriors(model, object, center_shape, sum);
-  depths->clear();
-  Linear<Pose> linear;
-  for (const int row : object.observations) {
-    const Observation& observation = history.observations[row];
-    const Station station = Station::At<Pose>(history.poses[observation.pose].data(), model.mount);
-    Linearize<Pose>(model, station, observation, center_shape, Edges::kBox, &linear);
-    sum->H.noalias() += linear.by_object.transpose() * linear.by_object;
-    sum->g += linear.by_object.transpose() * linear.residual;
-    cost += linear.cost;
-    depths->push_back(linear.depth);
-  }
-  return cost;
-}
-
-template <typename Pose>
-double CostAt(const Model& model,
-              const History<Pose>& history,
-              const Object& object,
-              const Vector9d& center_shape,
-              const std::vector<double>& depths) {
-  double cost = CostOfPriors(model, object, center_shape), unused;
-  for (size_t i = 0; i < object.observations.size(); ++i) {
-    const Observation& observation = history.observations[object.observations[i]];
-    const Station station = Station::At<Pose>(history.poses[observation.pose].data(), model.mount);
-    cost += CostOfObservation<Pose>(model, station, observation, center_shape, depths[i], &unused);
-  }
-  return cost;
-}
+constexpr int kIterations = 6;
+constexpr double kTolerance = 1e-4;
 
 }  // namespace
 
 template <typename Pose>
-double RefineObject(const Model& model,
-                    const History<Pose>& history,
-                    const Object& object,
-                    int iterations,
-                    Vector9d* center_shape) {
-  double damping = 1e-3, cost = std::numeric_limits<double>::infinity();
-  std::vector<double> depths;
-  for (int iteration = 0; iteration < iterations; ++iteration) {
-    GaussianPrior sum;
-    cost = LinearizeAt(model, history, object, *center_shape, &sum, &depths);
-    Matrix9d H = sum.H;
-    H.diagonal() *= 1 + damping;
-    const Vector9d step = -H.ldlt().solve(sum.g);
-    Vector9d trial;
-    const bool possible = step.allFinite() && Move(*center_shape, step, &trial);
-    const double after = possible ? CostAt(model, history, object, trial, depths) : cost;
-    if (!(after < cost)) {
-      damping *= 10;
-      continue;
-    }
-    const bool done = cost - after < 1e-4 * cost;
-    *center_shape = trial;
-    cost = after;
-    damping /= 5;
-    if (done) break;
+ObjectProblem<Pose>::ObjectProblem(const History<Pose>& history, const Object& object)
+    : model_(history.model), object_(object), depths_(object.observations.size(), 0) {
+  for (const int row : object.observations) {
+    observations_.push_back(&history.observations[row]);
+    stations_.push_back(history.StationAt(observations_.back()->pose));
   }
-  // A place where a observation is impossible is worth little, however well the tangents fit there.
-  return cost + kUndefinedCost * std::count_if(depths.begin(), depths.end(), [](double depth) {
-                  return depth > 0;
-                });
 }
 
 template <typename Pose>
-Vector9d InitializeObject(const Model& model, const History<Pose>& history, const Object& object) {
-  const Observation& observation = history.observations[object.observations.front()];
-  const Station station = Station::At<Pose>(history.poses[observation.pose].data(), model.mount);
-  if (!observation.is_box) {
-    const Rigid<double>& robot = station.world_from_robot;
-    const Eigen::Vector3d center = robot.rotation * observation.value.head<3>() + robot.translation;
-    return CenterShapeFromEllipsoid(Sphere(center, std::exp(object.size.log_mean)));
+Vector9d ObjectProblem<Pose>::Initialize() const {
+  const Observation& first = *observations_.front();
+  const Station& station = stations_.front();
+  if (first.IsBox()) {
+    const View view{station.camera, first.value, first.sqrt_information, first.truncated};
+    return CenterShapeFromEllipsoid(BackProject(model_.camera, {view}, object_.size));
   }
-  const View view{
-      station.camera, observation.value, observation.sqrt_information, observation.truncated};
-  return CenterShapeFromEllipsoid(BackProject(model.camera, {view}, object.size));
+  const Rigid<double>& robot = station.world_from_robot;
+  const Eigen::Vector3d center = robot.rotation * first.value.head<3>() + robot.translation;
+  return CenterShapeFromEllipsoid(Sphere(center, std::exp(object_.size.log_mean)));
 }
 
 template <typename Pose>
-Vector9d Reinitialize(const Model& model,
-                      const History<Pose>& history,
-                      const Object& object,
-                      bool by_size) {
-  const std::vector<View> views = ViewsOf(model, history, object);
-  if (views.empty()) return object.center_shape;
-  return CenterShapeFromEllipsoid(by_size ? BackProject(model.camera, views, object.size)
-                                          : FitSphere(model.camera, views, object.size));
+Vector9d ObjectProblem<Pose>::Reinitialize(bool by_size) const {
+  std::vector<View> views;
+  for (size_t i = 0; i < observations_.size(); ++i) {
+    const Observation& one = *observations_[i];
+    if (!one.IsBox()) continue;
+    views.push_back({stations_[i].camera, one.value, one.sqrt_information, one.truncated});
+  }
+  if (views.empty()) return object_.center_shape;
+  return CenterShapeFromEllipsoid(by_size ? BackProject(model_.camera, views, object_.size)
+                                          : FitSphere(model_.camera, views, object_.size));
 }
 
 template <typename Pose>
-void ReinitializeIfBetter(const Model& model, const History<Pose>& history, Object* object) {
-  Vector9d here = object->center_shape;
-  double cost = RefineObject(model, history, *object, kRefineIterations, &here);
+double ObjectProblem<Pose>::Refine(Vector9d* center_shape) {
+  const double cost = LevenbergMarquardt<9>(
+      kIterations,
+      kTolerance,
+      center_shape,
+      [&](const Vector9d& at, Matrix9d* H, Vector9d* g) { return Linearize(at, H, g); },
+      RetractCenterShape,
+      [&](const Vector9d& at) { return CostAt(at); });
+  const auto is_undefined = [](double depth) { return depth > 0; };
+  return cost + kUndefinedCost * std::count_if(depths_.begin(), depths_.end(), is_undefined);
+}
+
+template <typename Pose>
+Vector9d ObjectProblem<Pose>::ReinitializeIfBetter() {
+  Vector9d best = object_.center_shape;
+  double cost = Refine(&best);
   for (const bool by_size : {false, true}) {
-    Vector9d there = Reinitialize(model, history, *object, by_size);
-    const double other = RefineObject(model, history, *object, kRefineIterations, &there);
-    if (!(other < cost)) continue;
-    cost = other;
-    here = there;
+    Vector9d other = Reinitialize(by_size);
+    const double other_cost = Refine(&other);
+    if (!(other_cost < cost)) continue;
+    cost = other_cost;
+    best = other;
   }
-  object->center_shape = here;
+  return best;
 }
 
 template <typename Pose>
-Matrix9d InformationAt(const Model& model, const History<Pose>& history, const Object& object) {
-  GaussianPrior sum;
-  std::vector<double> unused;
-  LinearizeAt(model, history, object, object.center_shape, &sum, &unused);
-  return sum.H;
+Matrix9d ObjectProblem<Pose>::InformationAt(const Vector9d& center_shape) {
+  Matrix9d H;
+  Vector9d unused;
+  Linearize(center_shape, &H, &unused);
+  return H;
 }
 
-#define DQSLAM_INSTANTIATE(Pose)                                                                 \
-  template double RefineObject<Pose>(                                                            \
-      const Model&, const History<Pose>&, const Object&, int, Vector9d*);                        \
-  template Vector9d InitializeObject<Pose>(const Model&, const History<Pose>&, const Object&);   \
-  template Vector9d Reinitialize<Pose>(const Model&, const History<Pose>&, const Object&, bool); \
-  template Matrix9d InformationAt<Pose>(const Model&, const History<Pose>&, const Object&);      \
-  template void ReinitializeIfBetter<Pose>(const Model&, const History<Pose>&, Object*)
-DQSLAM_INSTANTIATE(Se2);
-DQSLAM_INSTANTIATE(Se3);
+template <typename Pose>
+double ObjectProblem<Pose>::Linearize(const Vector9d& center_shape, Matrix9d* H, Vector9d* g) {
+  GaussianPrior sum;
+  double cost = AddPriors(model_, object_, center_shape, &sum);
+  LinearizedObservation<Pose> linear;
+  for (size_t i = 0; i < observations_.size(); ++i) {
+    online::Linearize(
+        model_, stations_[i], *observations_[i], center_shape, EdgeResidual::kBox, &linear);
+    sum.H.noalias() += linear.by_object.transpose() * linear.by_object;
+    sum.g += linear.by_object.transpose() * linear.residual;
+    cost += linear.cost;
+    depths_[i] = linear.depth;
+  }
+  *H = sum.H;
+  *g = sum.g;
+  return cost;
+}
+
+template <typename Pose>
+double ObjectProblem<Pose>::CostAt(const Vector9d& center_shape) const {
+  double cost = CostOfPriors(model_, object_, center_shape), unused;
+  for (size_t i = 0; i < observations_.size(); ++i) {
+    cost += CostOfObservation<Pose>(
+        model_, stations_[i], *observations_[i], center_shape, depths_[i], &unused);
+  }
+  return cost;
+}
+
+template class ObjectProblem<Se2>;
+template class ObjectProblem<Se3>;
 
 }  // namespace dqslam::online

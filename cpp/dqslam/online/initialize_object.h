@@ -1,35 +1,43 @@
 // Where an object starts, and how it settles while the poses are held fixed.
 #pragma once
 
-#include "dqslam/online/linearize.h"
+#include <vector>
+
+#include "dqslam/online/history.h"
 
 namespace dqslam::online {
 
-/// Its cost and place after a few Levenberg-Marquardt steps over all its observations.
+/// All observations of an object, from poses that are held fixed: least squares in its center and
+/// shape.  History and object must outlive it.
 template <typename Pose>
-double RefineObject(const Model& model,
-                    const History<Pose>& history,
-                    const Object& object,
-                    int iterations,
-                    Vector9d* center_shape);
+class ObjectProblem {
+ public:
+  ObjectProblem(const History<Pose>& history, const Object& object);
 
-/// From the first observation: at the depth that the prior size implies, or where it was measured.
-template <typename Pose>
-Vector9d InitializeObject(const Model& model, const History<Pose>& history, const Object& object);
+  /// From the first observation: at the depth that the prior size implies, or where it was
+  /// measured.
+  Vector9d Initialize() const;
 
-/// From all its boxes: the sphere that fits their tangents, or of the prior size.
-template <typename Pose>
-Vector9d Reinitialize(const Model& model,
-                      const History<Pose>& history,
-                      const Object& object,
-                      bool by_size);
+  /// From all boxes: the sphere of the prior size, or the one that fits their tangents best.
+  Vector9d Reinitialize(bool by_size) const;
 
-/// Starts an object again from all its boxes, and keeps what fits them better.
-template <typename Pose>
-void ReinitializeIfBetter(const Model& model, const History<Pose>& history, Object* object);
+  /// Takes a few Levenberg-Marquardt steps; returns the cost.
+  double Refine(Vector9d* center_shape);
 
-/// Information about an object where it is, the poses of its observations held fixed.
-template <typename Pose>
-Matrix9d InformationAt(const Model& model, const History<Pose>& history, const Object& object);
+  /// The place that fits best, refined from where the object is and from both new starts.
+  Vector9d ReinitializeIfBetter();
+
+  Matrix9d InformationAt(const Vector9d& center_shape);
+
+ private:
+  double Linearize(const Vector9d& center_shape, Matrix9d* H, Vector9d* g);
+  double CostAt(const Vector9d& center_shape) const;
+
+  const Model& model_;
+  const Object& object_;
+  std::vector<const Observation*> observations_;
+  std::vector<Station> stations_;  ///< where each was made
+  std::vector<double> depths_;     ///< of the residuals linearized last, 0 for those of boxes
+};
 
 }  // namespace dqslam::online

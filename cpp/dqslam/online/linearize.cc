@@ -12,15 +12,14 @@ namespace dqslam {
 struct CenterShapeModel {
   template <typename T>
   static Surface<T> Unpack(const T* center_shape) {
-    return {Vector3<T>(center_shape[0], center_shape[1], center_shape[2]),
-            online::ShapeOf(center_shape)};
+    return {Vector3<T>(center_shape[0], center_shape[1], center_shape[2]), ShapeOf(center_shape)};
   }
 };
 
 // For ByPoseAndLandmark(): derivatives by the center_shape instead of a landmark's parameters.
 template <>
 struct Unpacked<CenterShapeModel> {
-  explicit Unpacked(const Vector9d& center_shape) : surface(online::SurfaceOf(center_shape)) {}
+  explicit Unpacked(const Vector9d& center_shape) : surface(SurfaceOf(center_shape)) {}
   Vector9d Gradient(const Eigen::Vector3d& m, double by_center, double by_shape) const {
     const Eigen::Vector3d b = by_shape * m;
     Vector9d gradient;
@@ -82,13 +81,13 @@ Vector4d LinearizeBox(const Model& model,
                       const Station& station,
                       const Observation& observation,
                       const Unpacked<CenterShapeModel>& object,
-                      Edges residual,
-                      Linear<Pose>* linear) {
+                      EdgeResidual residual,
+                      LinearizedObservation<Pose>* linear) {
   const Surface<double> in_camera = ToCamera(station.camera, object.surface);
   Vector4d error;
   EdgeDerivatives edges;
   linear->depth = 0;
-  if (residual == Edges::kTangent ||
+  if (residual == EdgeResidual::kTangent ||
       !ErrorsOf<true>(model.camera, observation, in_camera, 0, &error, &edges)) {
     linear->depth = TangentDepth(in_camera);
     if (!ErrorsOf<true>(model.camera, observation, in_camera, linear->depth, &error, &edges)) {
@@ -119,7 +118,7 @@ template <typename Pose>
 void LinearizeMeasurement(const Station& station,
                           const Observation& observation,
                           const Vector9d& center_shape,
-                          Linear<Pose>* linear) {
+                          LinearizedObservation<Pose>* linear) {
   linear->depth = 0;
   linear->residual.setZero();
   linear->by_pose.setZero();
@@ -153,7 +152,7 @@ double CostOfObservation(const Model& model,
                          double depth,
                          double* chi_square) {
   *chi_square = std::numeric_limits<double>::infinity();
-  if (!observation.is_box) {
+  if (!observation.IsBox()) {
     const bool defined = VisitMeasurement<Pose>(observation, [&](const auto& cost) {
       Eigen::Matrix<double, std::decay_t<decltype(cost)>::kResidualSize, 1> residual;
       if (!cost(station.pose, center_shape.data(), residual.data())) return false;
@@ -178,9 +177,9 @@ void Linearize(const Model& model,
                const Station& station,
                const Observation& observation,
                const Vector9d& center_shape,
-               Edges edges,
-               Linear<Pose>* linear) {
-  if (!observation.is_box) {
+               EdgeResidual edges,
+               LinearizedObservation<Pose>* linear) {
+  if (!observation.IsBox()) {
     LinearizeMeasurement(station, observation, center_shape, linear);
     return;
   }
@@ -197,11 +196,11 @@ void Linearize(const Model& model,
 }
 
 template <typename Pose>
-LinearStep<Pose> LinearizeStep(const typename History<Pose>::Step& step,
-                               const double* from,
-                               const double* to) {
+LinearizedStep<Pose> LinearizeStep(const typename History<Pose>::Step& step,
+                                   const double* from,
+                                   const double* to) {
   constexpr int k = Pose::kTangentSize;
-  LinearStep<Pose> linear;
+  LinearizedStep<Pose> linear;
   Eigen::Matrix<double, k, 2 * k> jacobian;
   Differentiate(OdometryCost<Pose>{{}, step.relative, step.sqrt_information},
                 &linear.residual,
@@ -252,7 +251,7 @@ double AddPriors(const Model& model,
                  const Object& object,
                  const Vector9d& center_shape,
                  GaussianPrior* sum) {
-  double cost = CostOf(object.map, center_shape);
+  double cost = object.map.CostAt(center_shape);
   const bool defined = VisitPriors(model, object, [&](const auto& prior) {
     constexpr int m = std::decay_t<decltype(prior)>::kResidualSize;
     Eigen::Matrix<double, m, 1> residual;
@@ -265,12 +264,12 @@ double AddPriors(const Model& model,
     return true;
   });
   sum->H += object.map.H;
-  sum->g += GradientOf(object.map, center_shape);
+  sum->g += object.map.GradientAt(center_shape);
   return defined ? cost : std::numeric_limits<double>::infinity();
 }
 
 double CostOfPriors(const Model& model, const Object& object, const Vector9d& center_shape) {
-  double cost = CostOf(object.map, center_shape);
+  double cost = object.map.CostAt(center_shape);
   const bool defined = VisitPriors(model, object, [&](const auto& prior) {
     Eigen::Matrix<double, std::decay_t<decltype(prior)>::kResidualSize, 1> residual;
     if (!prior(center_shape.data(), residual.data())) return false;
@@ -294,15 +293,19 @@ double LinearizeHeight(const Model& model,
   return residual[0];
 }
 
-#define DQSLAM_INSTANTIATE(Pose)                                                                \
-  template double CostOfObservation<Pose>(                                                      \
-      const Model&, const Station&, const Observation&, const Vector9d&, double, double*);      \
-  template void Linearize<Pose>(                                                                \
-      const Model&, const Station&, const Observation&, const Vector9d&, Edges, Linear<Pose>*); \
-  template LinearStep<Pose> LinearizeStep<Pose>(                                                \
-      const History<Pose>::Step&, const double*, const double*);                                \
-  template double CostOfStep<Pose>(const History<Pose>::Step&, const double*, const double*);   \
-  template double LinearizeHeight<Pose>(                                                        \
+#define DQSLAM_INSTANTIATE(Pose)                                                              \
+  template double CostOfObservation<Pose>(                                                    \
+      const Model&, const Station&, const Observation&, const Vector9d&, double, double*);    \
+  template void Linearize<Pose>(const Model&,                                                 \
+                                const Station&,                                               \
+                                const Observation&,                                           \
+                                const Vector9d&,                                              \
+                                EdgeResidual,                                                 \
+                                LinearizedObservation<Pose>*);                                \
+  template LinearizedStep<Pose> LinearizeStep<Pose>(                                          \
+      const History<Pose>::Step&, const double*, const double*);                              \
+  template double CostOfStep<Pose>(const History<Pose>::Step&, const double*, const double*); \
+  template double LinearizeHeight<Pose>(                                                      \
       const Model&, const double*, Eigen::Matrix<double, Pose::kTangentSize, 1>*)
 DQSLAM_INSTANTIATE(Se2);
 DQSLAM_INSTANTIATE(Se3);

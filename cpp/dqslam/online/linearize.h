@@ -1,28 +1,16 @@
 // Residuals and their derivatives by the tangent of the pose and the center_shape of the object.
 //
-// The edges' own are in edges.h; here they go on to the center_shape, in which the derivative of
-// n^T S n is the products of n's entries.  Where the object is not strictly in front, the tangent
-// residual takes the place of the box's, see costs/tangent.h.
+// Those of a box's edges are in box_derivatives.h; here they go on to the center_shape, by which
+// the derivative of n^T S n is the products of n's entries.  Where the object is not strictly in
+// front, the tangent residual takes the place of the box's, see costs/tangent.h.
 #pragma once
 
-#include "dqslam/geometry/box_derivatives.h"
 #include "dqslam/online/history.h"
-#include "dqslam/problem/graph.h"
 
 namespace dqslam::online {
 
-/// What all residuals share.
-struct Model {
-  Model(const Camera& camera, const ScenePriors& scene, double loss_scale)
-      : camera(camera), mount(camera), scene(scene), loss_scale(loss_scale) {}
-  Camera camera;
-  Mount mount;
-  ScenePriors scene;
-  double loss_scale;  ///< of the Cauchy loss, sigmas of a whole box; 0 for least squares
-};
-
 template <typename Pose>
-struct Linear {
+struct LinearizedObservation {
   Eigen::Vector4d residual;
   Eigen::Matrix<double, 4, Pose::kTangentSize> by_pose;
   Eigen::Matrix<double, 4, 9> by_object;
@@ -31,7 +19,7 @@ struct Linear {
   double depth;       ///< of the tangent residual [m], 0 where it is the box's
 };
 
-/// Cost of a observation after the loss, and its chi-square before; with the residual that
+/// Cost of an observation after the loss, and its chi-square before; with the residual that
 /// Linearize() used, of that depth.  Infinite where it is the box's and the object is not strictly
 /// in front.
 template <typename Pose>
@@ -42,8 +30,12 @@ double CostOfObservation(const Model& model,
                          double depth,
                          double* chi_square);
 
+/// What an observation costs beside its tangent residual where its object is not in front: such a
+/// place is worth little, however well the tangents fit there.
+inline constexpr double kUndefinedCost = 50;
+
 /// Which residual a box has where its object is in front; elsewhere it is the tangent's.
-enum class Edges { kBox, kTangent };
+enum class EdgeResidual { kBox, kTangent };
 
 /// The residual with derivatives.
 template <typename Pose>
@@ -51,21 +43,21 @@ void Linearize(const Model& model,
                const Station& station,
                const Observation& observation,
                const Vector9d& center_shape,
-               Edges edges,
-               Linear<Pose>* linear);
+               EdgeResidual edges,
+               LinearizedObservation<Pose>* linear);
 
 /// Residual and derivatives by the tangents of both poses, (k, 2 k).
 template <typename Pose>
-struct LinearStep {
+struct LinearizedStep {
   static constexpr int k = Pose::kTangentSize;
   Eigen::Matrix<double, k, 1> residual;
   Eigen::Matrix<double, k, k> by_from, by_to;
 };
 
 template <typename Pose>
-LinearStep<Pose> LinearizeStep(const typename History<Pose>::Step& step,
-                               const double* from,
-                               const double* to);
+LinearizedStep<Pose> LinearizeStep(const typename History<Pose>::Step& step,
+                                   const double* from,
+                                   const double* to);
 
 /// Half the squared distance of a step from its measurement, in sigmas.
 template <typename Pose>
@@ -77,15 +69,6 @@ double AddPriors(const Model& model,
                  const Vector9d& center_shape,
                  GaussianPrior* sum);
 double CostOfPriors(const Model& model, const Object& object, const Vector9d& center_shape);
-
-/// Cost of a quadratic at a center_shape; its gradient there.
-inline double CostOf(const GaussianPrior& quadratic, const Vector9d& center_shape) {
-  const Vector9d d = center_shape - quadratic.origin;
-  return quadratic.cost + quadratic.g.dot(d) + 0.5 * d.dot(quadratic.H * d);
-}
-inline Vector9d GradientOf(const GaussianPrior& quadratic, const Vector9d& center_shape) {
-  return quadratic.g + quadratic.H * (center_shape - quadratic.origin);
-}
 
 /// Derivatives by a pose of the camera's known height: J (k), residual; cost 0 where it is unknown.
 template <typename Pose>

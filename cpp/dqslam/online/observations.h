@@ -1,7 +1,9 @@
-// What a caller tells a session: what a pose saw, and later which objects its boxes show.
+// What a caller gives a session: what a pose saw, and later which objects its boxes show.
 #pragma once
 
-#include "dqslam/geometry/blocks.h"
+#include <vector>
+
+#include "dqslam/problem/graph.h"
 
 namespace dqslam::online {
 
@@ -9,13 +11,11 @@ namespace dqslam::online {
 /// a box of -1 waits for its object.
 struct StepObservations {
   IndexVector object;
-  RowMatrix box;         ///< (n, 4) undistorted pixels
-  RowMatrix covariance;  ///< (n, 16) pixels^2
-  BoolTable truncated;   ///< (n, 4)
-  IndexVector position_object;
-  RowMatrix position;             ///< (p, 3) object_in_robot, meters
-  RowMatrix position_covariance;  ///< (p, 9) meters^2
-  Eigen::VectorXd log_size_mean;  ///< of the new objects
+  RowMatrix box;                               ///< (n, 4) undistorted pixels
+  RowMatrix covariance;                        ///< (n, 16) pixels^2
+  BoolTable truncated;                         ///< (n, 4)
+  std::vector<MeasurementTable> measurements;  ///< one a kind; `pose` is not used
+  Eigen::VectorXd log_size_mean;               ///< of the new objects
   Eigen::VectorXd log_size_sigma;
 };
 

@@ -1,68 +1,46 @@
-#include "dqslam/online/reinitialize.h"
-
-#include <algorithm>
-
+// Recent poses and the objects they saw first, started again where a window cannot leave a place.
 #include "dqslam/online/checkpoint.h"
 #include "dqslam/online/initialize_object.h"
+#include "dqslam/online/window.h"
 
 namespace dqslam::online {
 namespace {
 
 constexpr int kIterations = 10;
-constexpr double kFirstDamping = 1e-8;
-
-// Objects of no map that were seen first from `begin` on.
-template <typename Pose>
-std::vector<int> YoungObjects(const History<Pose>& history, int begin) {
-  std::vector<int> young;
-  const int first = history.ObservationsBefore(begin);
-  for (int row = first; row < static_cast<int>(history.observations.size()); ++row) {
-    if (history.observations[row].Waits()) continue;
-    const Object& object = history.objects[history.observations[row].object];
-    const bool is_first = object.observations.front() == row;
-    if (is_first && object.map.H.isZero(0)) young.push_back(history.observations[row].object);
-  }
-  return young;
-}
 
 }  // namespace
 
 template <typename Pose>
-int Recover(const Model& model,
-            int begin,
-            const OnlineOptions& options,
-            Window<Pose>* window,
-            History<Pose>* history) {
-  using MarginalPriors = typename Window<Pose>::MarginalPriors;
-  const std::vector<int> young = YoungObjects(*history, begin);
+WindowResult Window<Pose>::Reinitialize(int begin, int iterations) {
+  const int first_observation = history_.ObservationsBefore(begin);
   double damping = kFirstDamping;
-  const WindowResult first = window->Minimize(
-      history, begin, MarginalPriors::kRelinearize, options.smoothing_iterations, &damping);
-  double best = CostOf(first);
-  int linearized = first.linearized;
+  WindowResult best = Minimize(begin, MarginalPriors::kRelinearize, iterations, &damping);
+  int linearized = best.linearized;
   for (const bool by_size : {false, true}) {
-    const Checkpoint<Pose> checkpoint(*history, begin);
-    BackToOdometry(begin, history);
-    for (const int row : young) {
-      Object& object = history->objects[row];
-      object.center_shape = Reinitialize(model, *history, object, by_size);
+    const Checkpoint<Pose> checkpoint(history_, begin);
+    history_.DeadReckon(begin);
+    for (const int row : history_.ObjectsSeenFrom(begin)) {
+      Object& object = history_.objects[row];
+      if (object.observations.front() < first_observation || object.IsOfMap()) continue;
+      object.center_shape = ObjectProblem(history_, object).Reinitialize(by_size);
     }
     damping = kFirstDamping;
-    const WindowResult towards = window->Minimize(
-        history, begin, MarginalPriors::kRelinearize, kIterations, &damping, Edges::kTangent);
+    const WindowResult towards = Minimize(
+        begin, MarginalPriors::kRelinearize, kIterations, &damping, EdgeResidual::kTangent);
     const WindowResult result =
-        window->Minimize(history, begin, MarginalPriors::kRelinearize, kIterations, &damping);
+        Minimize(begin, MarginalPriors::kRelinearize, kIterations, &damping);
     linearized += towards.linearized + result.linearized;
-    if (CostOf(result) < best) {
-      best = CostOf(result);
+    if (result.PenalizedCost() < best.PenalizedCost()) {
+      best = result;
     } else {
-      checkpoint.Restore(history);
+      checkpoint.Restore(&history_);
     }
   }
-  return linearized;
+  best.linearized = linearized;
+  return best;
 }
 
-template int Recover<Se2>(const Model&, int, const OnlineOptions&, Window<Se2>*, History<Se2>*);
-template int Recover<Se3>(const Model&, int, const OnlineOptions&, Window<Se3>*, History<Se3>*);
+template WindowResult Window<Se2>::Reinitialize(int, int);
+template WindowResult Window<Se3>::Reinitialize(int, int);
 
 }  // namespace dqslam::online

@@ -16,13 +16,9 @@ struct Relabeled {
   int last, back;
 };
 
-/// Throws std::invalid_argument naming the table and the row for what is wrong.
-template <typename Pose>
-void CheckLabels(const NewLabels& given, const History<Pose>& history);
-
 /// Moves boxes from object to object, adds the new objects, and leaves the others where they are.
-/// The labels have been checked.  WindowResult is that of the boxes and of the observations of
-/// their objects.
+/// The work is that of the boxes and of the observations of their objects.  Throws
+/// std::invalid_argument naming the table and the row, and then nothing has changed.
 template <typename Pose>
 std::vector<Relabeled> Relabel(const NewLabels& given, History<Pose>* history);
 

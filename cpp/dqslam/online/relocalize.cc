@@ -1,109 +1,124 @@
 #include "dqslam/online/relocalize.h"
 
-#include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <set>
 #include <stdexcept>
+#include <utility>
 
 #include "dqslam/costs/whitening.h"
 #include "dqslam/geometry/dispatch.h"
+#include "dqslam/online/levenberg_marquardt.h"
 #include "dqslam/online/linearize.h"
+#include "dqslam/problem/options.h"
 
 namespace dqslam::online {
 namespace {
 
-constexpr int kHeadings = 24;    // of SE(2)
-constexpr int kRotations = 400;  // of SE(3): about 30 degrees apart
-constexpr int kIterations = 15;
+constexpr int kHeadings = 24;                       // of SE(2)
+constexpr int kRotations = 400;                     // of SE(3): about 30 degrees apart
 constexpr int kSeedBoxes = 3;                       // that hypotheses set out from
-constexpr double kGate = 18.47;                     // chi-square of 4 degrees of freedom, 99.9 %
 constexpr double kApart_m = 0.3, kApart_rad = 0.1;  // two places, not one
+constexpr int kIterations = 8;  // with the noise of the start, and again with that of the end
+constexpr double kTolerance = 1e-8;
+// Keeps the equations definite where the boxes leave a direction of the pose open.
+constexpr double kLeastInformation = 1e-9;
 
 using Match = std::pair<int, int>;  // box, object
+
+// Evenly spread: around the vertical, or over all rotations by the spiral of Alexa 2022.
+template <typename Pose>
+Eigen::Quaterniond Rotation(int i) {
+  if constexpr (Pose::kModel == PoseModel::kSe2) {
+    const double half = M_PI * i / kHeadings;
+    return {std::cos(half), 0, 0, std::sin(half)};
+  } else {
+    const double s = i + 0.5, t = s / kRotations;
+    const double a = 2 * M_PI * s / std::sqrt(2.0), b = 2 * M_PI * s / 1.533751168755204288118041;
+    const double r = std::sqrt(t), q = std::sqrt(1 - t);
+    return Eigen::Quaterniond(q * std::cos(b), r * std::sin(a), r * std::cos(a), q * std::sin(b));
+  }
+}
 
 template <typename Pose>
 class Search {
  public:
+  static constexpr int k = Pose::kTangentSize;
   using Storage = Eigen::Matrix<double, Pose::kSize, 1>;
-  using Square = Eigen::Matrix<double, Pose::kTangentSize, Pose::kTangentSize>;
+  using Square = Eigen::Matrix<double, k, k>;
+  using Column = Eigen::Matrix<double, k, 1>;
 
   struct Place {
     Storage pose;
-    Square information;
     std::vector<Match> matches;
     double chi_square = std::numeric_limits<double>::infinity();
-    bool IsBetterThan(const Place& other) const {
-      if (matches.size() != other.matches.size()) return matches.size() > other.matches.size();
-      return chi_square < other.chi_square;
+    Square information = Square::Zero();
+    static bool IsBetter(const Place& a, const Place& b) {
+      if (a.matches.size() != b.matches.size()) return a.matches.size() > b.matches.size();
+      return a.chi_square < b.chi_square;
     }
   };
 
   Search(const Camera& camera, const MapView& view)
       : model_(camera, ScenePriors(), 0), view_(view) {
     for (Eigen::Index row = 0; row < view.ellipsoids.rows(); ++row) {
-      charts_.push_back(CenterShapeFromEllipsoid(view.ellipsoids.row(row).transpose()));
-      using Square9 = Eigen::Matrix<double, 9, 9, Eigen::RowMajor>;
-      const Matrix9d of_ellipsoid =
-          Eigen::Map<const Square9>(view.covariance.row(row).data()).inverse();
-      spread_.push_back(InformationInCenterShape(charts_.back(), of_ellipsoid).inverse());
+      objects_.push_back(CenterShapeFromEllipsoid(view.ellipsoids.row(row).transpose()));
+      const Matrix9d covariance = view.covariance.row(row).reshaped<Eigen::RowMajor>(9, 9);
+      spread_.push_back(InformationInCenterShape(objects_.back(), covariance.inverse()).inverse());
     }
     for (Eigen::Index row = 0; row < view.box.rows(); ++row) {
-      Observation observation{};
-      observation.value = view.box.row(row).transpose();
-      observation.truncated = view.truncated.row(row);
-      using Square4 = Eigen::Matrix<double, 4, 4, Eigen::RowMajor>;
-      noise_.push_back(Eigen::Map<const Square4>(view.box_covariance.row(row).data()));
-      observation.sqrt_information = SqrtInformation<4>(noise_.back());
-      sights_.push_back(observation);
+      noise_.push_back(view.box_covariance.row(row).reshaped<Eigen::RowMajor>(4, 4));
+      boxes_.emplace_back();
+      boxes_.back().value = view.box.row(row).transpose();
+      boxes_.back().truncated = view.truncated.row(row);
     }
   }
 
   // Places, best first, no two of them the same.
   std::vector<Place> Run() {
-    const bool is_known = std::all_of(view_.candidates.begin(),
-                                      view_.candidates.end(),
-                                      [](const auto& objects) { return objects.size() <= 1; });
-    if (is_known) {
-      std::vector<Match> all;
-      for (size_t box = 0; box < sights_.size(); ++box) {
-        if (!view_.candidates[box].empty()) all.push_back({box, view_.candidates[box][0]});
-      }
-      for (size_t seed = 0; seed < std::min<size_t>(all.size(), kSeedBoxes); ++seed) {
-        Try(all[seed], all);
-      }
-    } else {
-      TryPairs();
-    }
-    std::sort(places_.begin(), places_.end(), [](const Place& a, const Place& b) {
-      return a.IsBetterThan(b);
-    });
+    for (const std::vector<Match>& matches : Hypotheses()) Try(matches);
+    std::sort(places_.begin(), places_.end(), Place::IsBetter);
     return places_;
   }
 
  private:
-  void TryPairs() {
-    const int seeds = std::min<int>(sights_.size(), kSeedBoxes);
+  // Matches to begin with; the first one of each is the seed.
+  std::vector<std::vector<Match>> Hypotheses() const {
+    const auto& candidates = view_.candidates;
+    std::vector<std::vector<Match>> hypotheses;
+    const auto is_known = [](const std::vector<int>& objects) { return objects.size() <= 1; };
+    if (std::all_of(candidates.begin(), candidates.end(), is_known)) {
+      std::vector<Match> all;
+      for (size_t box = 0; box < candidates.size(); ++box) {
+        if (!candidates[box].empty()) all.push_back({box, candidates[box][0]});
+      }
+      for (size_t seed = 0; seed < std::min<size_t>(all.size(), kSeedBoxes); ++seed) {
+        hypotheses.push_back(all);
+        std::swap(hypotheses.back()[0], hypotheses.back()[seed]);
+      }
+      return hypotheses;
+    }
+    const int seeds = std::min<int>(candidates.size(), kSeedBoxes);
     for (int a = 0; a < seeds; ++a) {
       for (int b = a + 1; b < seeds; ++b) {
-        for (const int i : view_.candidates[a]) {
-          for (const int j : view_.candidates[b]) {
-            if (i != j) Try({a, i}, {{a, i}, {b, j}});
+        for (const int i : candidates[a]) {
+          for (const int j : candidates[b]) {
+            if (i != j) hypotheses.push_back({{a, i}, {b, j}});
           }
         }
       }
     }
+    return hypotheses;
   }
 
-  // All headings from which the seed's box shows its object, refined on `matches`.
-  void Try(const Match& seed, const std::vector<Match>& matches) {
-    for (const Storage& start : Starts(seed)) {
-      Place place;
-      place.pose = start;
-      place.matches = matches;
+  // All headings from which the seed's box shows its object, refined on the matches.
+  void Try(const std::vector<Match>& matches) {
+    for (const Storage& start : Starts(matches[0])) {
+      Place place{start, matches};
       Refine(&place);
-      const bool fits = place.chi_square <= kGate * matches.size();
-      if (!fits) continue;
+      if (!(place.chi_square <= kBoxChiSquare999 * matches.size())) continue;
       for (int round = 0; round < 2; ++round) {
         place.matches = Assign(place.pose);
         if (place.matches.size() < 2) break;
@@ -115,138 +130,114 @@ class Search {
 
   std::vector<Storage> Starts(const Match& seed) const {
     const Camera& camera = model_.camera;
-    const Eigen::Vector4d& box = sights_[seed.first].value;
-    const Surface<double> object = SurfaceOf(charts_[seed.second]);
+    const Eigen::Vector4d& box = boxes_[seed.first].value;
+    const Surface<double> object = SurfaceOf(objects_[seed.second]);
     const double radius = std::pow(object.shape.determinant(), 1.0 / 6);
     const double side = std::sqrt((box[2] - box[0]) / camera.fx * (box[3] - box[1]) / camera.fy);
     const Eigen::Vector3d ray((0.5 * (box[0] + box[2]) - camera.cx) / camera.fx,
                               (0.5 * (box[1] + box[3]) - camera.cy) / camera.fy,
                               1);
     const double depth = std::max(2 * radius / side, 1.5 * radius);
-    const Eigen::Matrix3d robot_from_camera = model_.mount.camera_from_robot.transpose();
     const Eigen::Vector3d in_robot =
-        robot_from_camera * (depth * ray) + model_.mount.camera_in_robot;
+        model_.mount.camera_from_robot.transpose() * (depth * ray) + model_.mount.camera_in_robot;
     std::vector<Storage> starts;
     const int count = Pose::kModel == PoseModel::kSe2 ? kHeadings : kRotations;
     for (int i = 0; i < count; ++i) {
-      const Eigen::Quaterniond turn = Rotation(i);
+      const Eigen::Quaterniond turn = Rotation<Pose>(i);
       const Eigen::Vector3d t = object.center - turn * in_robot;
-      Storage start;
+      starts.emplace_back();
       if constexpr (Pose::kModel == PoseModel::kSe2) {
-        start << t.x(), t.y(), 2 * M_PI * i / kHeadings;
+        starts.back() << t.x(), t.y(), 2 * M_PI * i / kHeadings;
       } else {
-        start << t, turn.coeffs();
+        starts.back() << t, turn.coeffs();
       }
-      starts.push_back(start);
     }
     return starts;
   }
 
-  // Evenly spread: around the vertical, or over all rotations by the spiral of Alexa 2022.
-  static Eigen::Quaterniond Rotation(int i) {
-    if constexpr (Pose::kModel == PoseModel::kSe2) {
-      const double half = M_PI * i / kHeadings;
-      return {std::cos(half), 0, 0, std::sin(half)};
-    } else {
-      const double s = i + 0.5, t = s / kRotations;
-      const double a = 2 * M_PI * s / std::sqrt(2.0), b = 2 * M_PI * s / 1.533751168755204288118041;
-      const double r = std::sqrt(t), q = std::sqrt(1 - t);
-      return Eigen::Quaterniond(q * std::cos(b), r * std::sin(a), r * std::cos(a), q * std::sin(b));
-    }
+  Station StationAt(const Storage& pose) const {
+    return Station::At<Pose>(pose.data(), model_.mount);
   }
 
-  // The observation of a match, with the map's uncertainty as a part of its noise.
+  double CostOfBox(const Station& station, const Observation& box, double depth) const {
+    double unused;
+    return CostOfObservation<Pose>(model_, station, box, objects_[box.object], depth, &unused);
+  }
+
+  // The box of a match, with the map's uncertainty as a part of its noise.
   Observation Blurred(const Station& station, const Match& match) const {
-    Observation observation = sights_[match.first];
-    Linear<Pose> linear;
-    Observation bare = observation;
-    bare.sqrt_information.setIdentity();
-    Linearize<Pose>(model_, station, bare, charts_[match.second], Edges::kBox, &linear);
-    const Eigen::Matrix4d total = noise_[match.first] + linear.by_object * spread_[match.second] *
-                                                            linear.by_object.transpose();
+    Observation box = boxes_[match.first];
+    box.object = match.second;
+    box.sqrt_information.setIdentity();
+    LinearizedObservation<Pose> linear;
+    Linearize(model_, station, box, objects_[box.object], EdgeResidual::kBox, &linear);
+    const auto& J = linear.by_object;
+    const Eigen::Matrix4d total = noise_[match.first] + J * spread_[box.object] * J.transpose();
     const Eigen::LLT<Eigen::Matrix4d> cholesky(total);
-    if (cholesky.info() != Eigen::Success) return observation;
-    observation.sqrt_information = cholesky.matrixL().solve(Eigen::Matrix4d::Identity());
-    return observation;
+    box.sqrt_information = cholesky.info() == Eigen::Success
+                               ? cholesky.matrixL().solve(Eigen::Matrix4d::Identity())
+                               : SqrtInformation<4>(noise_[match.first]);
+    return box;
   }
 
+  // Takes the pose to where it fits its matches best.
   void Refine(Place* place) const {
-    double damping = 1e-3;
-    std::vector<Observation> observations;
-    for (int iteration = 0; iteration < kIterations; ++iteration) {
-      const Station station = Station::At<Pose>(place->pose.data(), model_.mount);
-      // Their noise depends on the pose: that of the start, and of the middle.
-      if (iteration == 0 || iteration == kIterations / 2) {
-        observations.clear();
-        for (const Match& match : place->matches) observations.push_back(Blurred(station, match));
-      }
-      Square H = Square::Zero();
-      Eigen::Matrix<double, Pose::kTangentSize, 1> g;
-      g.setZero();
-      double cost = 0;
-      std::vector<double> depths;
-      for (size_t i = 0; i < observations.size(); ++i) {
-        Linear<Pose> linear;
-        const Vector9d& center_shape = charts_[place->matches[i].second];
-        Linearize<Pose>(model_, station, observations[i], center_shape, Edges::kBox, &linear);
-        H += linear.by_pose.transpose() * linear.by_pose;
-        g += linear.by_pose.transpose() * linear.residual;
-        cost += linear.cost;
-        depths.push_back(linear.depth);
-      }
-      place->information = H;
-      Square damped = H;
-      damped.diagonal() *= 1 + damping;
-      damped.diagonal().array() += 1e-9;
-      const Eigen::Matrix<double, Pose::kTangentSize, 1> step = -damped.ldlt().solve(g);
-      Storage trial;
-      Plus<Pose>(place->pose.data(), step.data(), trial.data());
-      Pose::Normalize(trial.data());
-      const double after = CostAt(trial, *place, observations, depths);
-      if (after < cost) {
-        place->pose = trial;
-        damping /= 5;
-        if (cost - after < 1e-8 * cost && iteration > kIterations / 2) break;
-      } else {
-        damping *= 10;
-      }
+    for (int round = 0; round < 2; ++round) {
+      std::vector<Observation> boxes;
+      for (const Match& match : place->matches)
+        boxes.push_back(Blurred(StationAt(place->pose), match));
+      std::vector<double> depths(boxes.size(), 0);
+      const auto linearize = [&](const Storage& pose, Square* H, Column* g) {
+        const Station station = StationAt(pose);
+        *H = kLeastInformation * Square::Identity();
+        g->setZero();
+        double cost = 0;
+        LinearizedObservation<Pose> linear;
+        for (size_t i = 0; i < boxes.size(); ++i) {
+          const Vector9d& object = objects_[boxes[i].object];
+          Linearize(model_, station, boxes[i], object, EdgeResidual::kBox, &linear);
+          *H += linear.by_pose.transpose() * linear.by_pose;
+          *g += linear.by_pose.transpose() * linear.residual;
+          cost += linear.cost;
+          depths[i] = linear.depth;
+        }
+        place->information = *H;
+        return cost;
+      };
+      const auto retract = [](const Storage& pose, const Column& step, Storage* result) {
+        *result = History<Pose>::Retract(pose, step);
+        return true;
+      };
+      const auto cost_at = [&](const Storage& pose) {
+        const Station station = StationAt(pose);
+        double cost = 0;
+        for (size_t i = 0; i < boxes.size(); ++i) cost += CostOfBox(station, boxes[i], depths[i]);
+        return cost;
+      };
+      LevenbergMarquardt<k>(kIterations, kTolerance, &place->pose, linearize, retract, cost_at);
+      depths.assign(boxes.size(), 0);  // infinite now where an object is not in front
+      place->chi_square = 2 * cost_at(place->pose);
     }
-    place->chi_square =
-        2 * CostAt(place->pose, *place, observations, std::vector<double>(observations.size()));
-  }
-
-  double CostAt(const Storage& pose,
-                const Place& place,
-                const std::vector<Observation>& observations,
-                const std::vector<double>& depths) const {
-    const Station station = Station::At<Pose>(pose.data(), model_.mount);
-    double cost = 0, unused;
-    for (size_t i = 0; i < observations.size(); ++i) {
-      cost += CostOfObservation<Pose>(
-          model_, station, observations[i], charts_[place.matches[i].second], depths[i], &unused);
-    }
-    return std::isfinite(cost) ? cost : std::numeric_limits<double>::infinity();
   }
 
   // Each box to the object that it fits best, the best pairs first.
   std::vector<Match> Assign(const Storage& pose) const {
-    const Station station = Station::At<Pose>(pose.data(), model_.mount);
+    const Station station = StationAt(pose);
     std::vector<std::pair<double, Match>> pairs;
-    for (size_t box = 0; box < sights_.size(); ++box) {
+    for (size_t box = 0; box < boxes_.size(); ++box) {
       for (const int object : view_.candidates[box]) {
         const Match match(box, object);
-        double chi_square;
-        CostOfObservation<Pose>(
-            model_, station, Blurred(station, match), charts_[object], 0, &chi_square);
-        if (chi_square <= kGate) pairs.push_back({chi_square, match});
+        const double chi_square = 2 * CostOfBox(station, Blurred(station, match), 0);
+        if (chi_square <= kBoxChiSquare999) pairs.push_back({chi_square, match});
       }
     }
     std::sort(pairs.begin(), pairs.end());
-    std::vector<bool> box_taken(sights_.size(), false), object_taken(charts_.size(), false);
+    std::set<int> boxes_taken, objects_taken;
     std::vector<Match> matches;
     for (const auto& [chi_square, match] : pairs) {
-      if (box_taken[match.first] || object_taken[match.second]) continue;
-      box_taken[match.first] = object_taken[match.second] = true;
+      if (boxes_taken.count(match.first) || objects_taken.count(match.second)) continue;
+      boxes_taken.insert(match.first);
+      objects_taken.insert(match.second);
       matches.push_back(match);
     }
     std::sort(matches.begin(), matches.end());
@@ -254,16 +245,13 @@ class Search {
   }
 
   void Keep(const Place& place) {
+    constexpr int turns = Pose::kModel == PoseModel::kSe2 ? 1 : 3;
     for (Place& other : places_) {
-      double tangent[Pose::kTangentSize];
-      Minus<Pose>(place.pose.data(), other.pose.data(), tangent);
-      constexpr int turns = Pose::kModel == PoseModel::kSe2 ? 1 : 3;
-      double moved = 0, turned = 0;
-      for (int i = 0; i < Pose::kTangentSize; ++i) {
-        (i < Pose::kTangentSize - turns ? moved : turned) += tangent[i] * tangent[i];
-      }
-      if (std::sqrt(moved) > kApart_m || std::sqrt(turned) > kApart_rad) continue;
-      if (place.IsBetterThan(other)) other = place;
+      Column apart;
+      Minus<Pose>(place.pose.data(), other.pose.data(), apart.data());
+      if (apart.template head<k - turns>().norm() > kApart_m) continue;
+      if (apart.template tail<turns>().norm() > kApart_rad) continue;
+      if (Place::IsBetter(place, other)) other = place;
       return;
     }
     places_.push_back(place);
@@ -271,27 +259,25 @@ class Search {
 
   const Model model_;
   const MapView& view_;
-  std::vector<Vector9d> charts_;
-  std::vector<Matrix9d> spread_;
-  std::vector<Eigen::Matrix4d> noise_;
-  std::vector<Observation> sights_;
+  std::vector<Vector9d> objects_;  // center and shape
+  std::vector<Matrix9d> spread_;   // covariance of each
+  std::vector<Observation> boxes_;
+  std::vector<Eigen::Matrix4d> noise_;  // covariance of each
   std::vector<Place> places_;
 };
 
 }  // namespace
 
 Relocation Relocalize(PoseModel pose_model, const Camera& camera, const MapView& view, int fewest) {
-  const auto shown = std::count_if(view.candidates.begin(),
-                                   view.candidates.end(),
-                                   [](const auto& objects) { return !objects.empty(); });
+  int shown = 0;
+  for (const std::vector<int>& objects : view.candidates) shown += !objects.empty();
   if (shown < fewest) {
     throw std::invalid_argument("relocalize: " + std::to_string(shown) +
                                 " boxes show objects of the map, " + std::to_string(fewest) +
                                 " are needed");
   }
   return Dispatch(pose_model, [&](auto model) {
-    using Pose = decltype(model);
-    const auto places = Search<Pose>(camera, view).Run();
+    const auto places = Search<decltype(model)>(camera, view).Run();
     if (places.empty() || static_cast<int>(places[0].matches.size()) < fewest) {
       throw std::invalid_argument("relocalize: no pose explains " + std::to_string(fewest) +
                                   " of the boxes");
@@ -304,7 +290,6 @@ Relocation Relocalize(PoseModel pose_model, const Camera& camera, const MapView&
     for (const auto& [box, object] : best.matches) found.object[box] = object;
     found.chi_square = best.chi_square;
     found.matches = static_cast<int>(best.matches.size());
-    found.runner_up = std::numeric_limits<double>::infinity();
     if (places.size() > 1 && places[1].matches.size() == best.matches.size()) {
       found.runner_up = places[1].chi_square;
       found.other = places[1].pose;

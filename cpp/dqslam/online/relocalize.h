@@ -5,10 +5,10 @@
 // until all objects are in front, takes it on; all boxes then judge it.
 #pragma once
 
+#include <limits>
 #include <vector>
 
 #include "dqslam/geometry/camera.h"
-#include "dqslam/geometry/pose.h"
 
 namespace dqslam::online {
 
@@ -29,7 +29,8 @@ struct Relocation {
   IndexVector object;     ///< of each box; -1 for none
   double chi_square = 0;  ///< of the boxes that have an object
   int matches = 0;        ///< these boxes
-  double runner_up = 0;   ///< chi-square of the best other place with as many; infinite: none
+  /// Chi-square of the best other place with as many matches; infinite where there is none.
+  double runner_up = std::numeric_limits<double>::infinity();
   Eigen::VectorXd other;  ///< that place
 };
 

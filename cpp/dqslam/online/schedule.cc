@@ -5,9 +5,9 @@
 namespace dqslam::online {
 namespace {
 
-constexpr double kLapObjects = 40;  // in the front of a lap of full length, at most
-// A young session minimizes a lap whenever it has grown by this share, after so many steps.
-constexpr int kLapGrowth = 4, kSoonestLap = 16;
+constexpr double kFrontObjects = 40;  // that a smoothing of full length has room for
+// A young session has a medium smoothing whenever it has grown by this share, after so many steps.
+constexpr int kGrowth = 4, kSoonest = 16;
 constexpr double kMostCredit = 3;
 
 }  // namespace
@@ -36,23 +36,25 @@ Smoothing Schedule::Choose(const WindowFit& window) {
   if (ClosesLoop(window)) {
     return {std::min(loop_begin_, window.begin), options_.loop_iterations, 2, true};
   }
-  if (end >= std::max(next_lap_, kSoonestLap)) {
-    next_lap_ = end + std::clamp(end / kLapGrowth, kSoonestLap, options_.lap_every);
-    const int lap = Shortened(options_.lap_poses), tour = Shortened(options_.tour_poses);
-    if (end < std::max(next_tour_, options_.tour_every) || tour <= lap) {
-      return {last(lap), options_.smoothing_iterations};
+  const SmoothingLevel& medium_level = options_.medium_smoothing;
+  const SmoothingLevel& long_level = options_.long_smoothing;
+  if (end >= std::max(next_medium_, kSoonest)) {
+    next_medium_ = end + std::min(std::max(end / kGrowth, kSoonest), medium_level.every);
+    const int poses = Shortened(medium_level.poses), more = Shortened(long_level.poses);
+    if (end < std::max(next_long_, long_level.every) || more <= poses) {
+      return {last(poses), medium_level.iterations};
     }
-    next_tour_ = end + options_.tour_every;
-    return {last(tour), 1, 1};
+    next_long_ = end + long_level.every;
+    return {last(more), long_level.iterations, 1};
   }
-  if (end % options_.recent_every == 0) {
-    return {last(options_.recent_poses), options_.smoothing_iterations};
+  if (end % options_.short_smoothing.every == 0) {
+    return {last(options_.short_smoothing.poses), options_.short_smoothing.iterations};
   }
   return {window.begin};
 }
 
 bool Schedule::ClosesLoop(const WindowFit& window) {
-  loop_credit_ = std::min(loop_credit_ + 1.0 / options_.lap_every, kMostCredit);
+  loop_credit_ = std::min(loop_credit_ + 1.0 / options_.medium_smoothing.every, kMostCredit);
   const bool is_near = loop_until_ >= window.end - 1;
   const bool fits = !loop_misfits_ && window.chi_square <= options_.loop_chi_square;
   if (!is_near || fits || loop_credit_ < 1) return false;
@@ -63,13 +65,13 @@ bool Schedule::ClosesLoop(const WindowFit& window) {
 }
 
 void Schedule::SmoothedWith(int poses, int objects_in_front) {
-  if (poses > options_.recent_poses) lap_objects_ = objects_in_front;
+  if (poses > options_.short_smoothing.poses) front_objects_ = objects_in_front;
 }
 
 int Schedule::Shortened(int poses) const {
-  const double square = lap_objects_ * lap_objects_ / (kLapObjects * kLapObjects);
+  const double square = front_objects_ * front_objects_ / (kFrontObjects * kFrontObjects);
   const int fewer = static_cast<int>(poses / std::max(square, 1.0));
-  return std::max(fewer, std::min(options_.recent_poses, poses));
+  return std::max(fewer, std::min(options_.short_smoothing.poses, poses));
 }
 
 }  // namespace dqslam::online

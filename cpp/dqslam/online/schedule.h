@@ -24,20 +24,20 @@ class Schedule {
  public:
   explicit Schedule(const OnlineOptions& options) : options_(options) {}
 
-  /// An object is seen that was seen last from the pose `last`: whether it closes a loop, for which
-  /// the window is watched from pose `now` on.
+  /// An object is seen from the pose `back` that was seen last from the pose `last`: returns
+  /// whether it closes a loop, for which the window is watched from the pose `now` on.
   bool WatchLoop(int last, int back, int now);
-  /// What is watched for does not fit, whatever the window shows.
+  /// The loop that is watched for does not fit, whatever the window shows.
   void LoopDoesNotFit() { loop_misfits_ = true; }
 
-  /// Whether the recent poses and their young objects are to start again.
+  /// Whether the last poses and their young objects are to start again.
   bool Recovers(const WindowFit& window);
 
   /// Called once a step.
   Smoothing Choose(const WindowFit& window);
 
-  /// WindowResult is square in the objects of the front: where there are many, laps have fewer
-  /// poses.
+  /// The work is square in the objects of the front: where there are many, medium and long
+  /// smoothings have fewer poses.
   void SmoothedWith(int poses, int objects_in_front);
 
  private:
@@ -47,11 +47,11 @@ class Schedule {
   OnlineOptions options_;
   int loop_begin_ = 0;         // the pose that last saw what has come back
   int loop_until_ = -1;        // until when the window is watched for it
-  bool loop_misfits_ = false;  // told late: no watching is needed
+  bool loop_misfits_ = false;  // known from late labels: no watching is needed
   double loop_credit_ = 1;     // loops that may be closed now
-  int next_lap_ = 0, next_tour_ = 0;
+  int next_medium_ = 0, next_long_ = 0;
   int next_recovery_ = 0;
-  double lap_objects_ = 0;  // in the front of the last lap
+  double front_objects_ = 0;  // of the last smoothing that was longer than a short one
 };
 
 }  // namespace dqslam::online

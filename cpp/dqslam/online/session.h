@@ -1,4 +1,4 @@
-// Estimation step by step: bounded result at each, an estimate at any time.
+// Estimation step by step: bounded work at each, an estimate at any time.
 //
 // At a step the last poses and the objects they saw are minimized, poses before them constant and
 // the observations from there kept as Gaussians on the objects.  Now and then more poses are, so
@@ -7,27 +7,25 @@
 #pragma once
 
 #include <memory>
-#include <vector>
 
 #include "dqslam/online/observations.h"
 #include "dqslam/online/options.h"
-#include "dqslam/problem/graph.h"
 
 namespace dqslam::online {
 
 /// What a step cost.
 struct StepReport {
-  int pose = 0;               ///< row of the new pose
-  int first_observation = 0;  ///< row of the first it saw: boxes as they were given, then positions
-  int window_poses = 0;       ///< poses of the window
-  int window_objects = 0;     ///< objects that it saw
-  int linearized = 0;         ///< observations, in the window and to keep what lies before it
-  int undefined = 0;          ///< observations of the window whose objects are not in front
-  double chi_square = 0;      ///< of the window, per residual: 1 where the model is right
-  int smoothed_poses = 0;     ///< poses minimized beside the window; 0 at most steps
+  int pose = 0;                   ///< row of the new pose
+  int first_observation = 0;      ///< row of its first: boxes as they were given, then positions
+  int window_poses = 0;           ///< poses of the window
+  int window_objects = 0;         ///< objects that it saw
+  int linearized = 0;             ///< observations, in the window and to keep what lies before it
+  int undefined = 0;              ///< observations of the window whose objects are not in front
+  double chi_square = 0;          ///< of the window, per residual: 1 where the model is right
+  int smoothed_poses = 0;         ///< poses minimized beside the window; 0 at most steps
   int smoothed_observations = 0;  ///< observations linearized there
-  bool closed_loop = false;
-  bool recovered = false;  ///< young objects were started again
+  bool closed_loop = false;       ///< a loop that did not fit was solved
+  bool recovered = false;         ///< the last poses and their young objects were started again
 };
 
 class Session {
@@ -65,8 +63,8 @@ class Session {
   /// rigidly with the last of these poses.
   virtual void Merge(const RowMatrix& poses, const RowMatrix& ellipsoids) = 0;
 
-  /// All of it as a problem for Solve(): objects without a observation take no part, and keep their
-  /// row in `rows`.
+  /// All of it as a problem for Solve(): objects without a box take no part, and `rows` has
+  /// the row of each that does.
   virtual Graph ToGraph(std::vector<int>* rows) const = 0;
 
   virtual int num_poses() const = 0;

@@ -1,96 +1,104 @@
-#include "dqslam/online/to_graph.h"
-
+// A history as a problem for Solve().
+#include <Eigen/LU>
 #include <algorithm>
 
+#include "dqslam/costs/measurements.h"
+#include "dqslam/online/history.h"
+
 namespace dqslam::online {
+namespace {
+
+// Observations of a kind, of objects that are in the graph.
+std::vector<const Observation*> OfKind(const std::vector<Observation>& observations,
+                                       const std::vector<int>& row_in_graph,
+                                       int kind) {
+  std::vector<const Observation*> found;
+  for (const Observation& one : observations) {
+    const bool takes_part = !one.Waits() && row_in_graph[one.object] >= 0;
+    if (takes_part && one.kind == kind) found.push_back(&one);
+  }
+  return found;
+}
+
+// Fills a table of the graph with observations of m numbers each.
+template <typename Table>
+void Fill(const std::vector<const Observation*>& observations,
+          const std::vector<int>& row_in_graph,
+          int m,
+          Table* table,
+          RowMatrix* values) {
+  const Eigen::Index count = static_cast<Eigen::Index>(observations.size());
+  table->pose.resize(count);
+  table->object.resize(count);
+  values->resize(count, m);
+  table->covariance.resize(count, m * m);
+  for (Eigen::Index row = 0; row < count; ++row) {
+    const Observation& one = *observations[row];
+    const Eigen::MatrixXd W = one.sqrt_information.topLeftCorner(m, m);
+    const Eigen::MatrixXd covariance = (W.transpose() * W).inverse();
+    table->pose[row] = one.pose;
+    table->object[row] = row_in_graph[one.object];
+    values->row(row) = one.value.head(m).transpose();
+    table->covariance.row(row) = covariance.reshaped().transpose();
+  }
+}
+
+}  // namespace
 
 template <typename Pose>
-Graph ToGraph(const Model& model, const History<Pose>& history, std::vector<int>* rows) {
+Graph History<Pose>::ToGraph(std::vector<int>* rows) const {
   constexpr int k = Pose::kTangentSize;
-  using Storage = typename History<Pose>::Storage;
-  const int poses = history.num_poses(), objects = static_cast<int>(history.objects.size());
   Graph graph;
   graph.pose_model = Pose::kModel;
   graph.camera = model.camera;
   graph.scene_priors = model.scene;
-  graph.initial_poses.resize(poses, Pose::kSize);
-  const int steps = std::max(poses - 1, 0);
-  graph.odometry.from = IndexVector::LinSpaced(steps, 0, steps - 1);
-  graph.odometry.to = IndexVector::LinSpaced(steps, 1, steps);
-  graph.odometry.relative.resize(steps, Pose::kSize);
-  graph.odometry.covariance.resize(steps, k * k);
-  for (int pose = 0; pose < poses; ++pose) {
-    const auto& step = history.steps[pose];
-    Storage at = step.relative;
-    if (pose > 0) {
-      Pose::Compose(graph.initial_poses.row(pose - 1).data(), step.relative.data(), at.data());
-      Pose::Normalize(at.data());
-      graph.odometry.relative.row(pose - 1) = step.relative.transpose();
-      Eigen::Map<Eigen::Matrix<double, k, k, Eigen::RowMajor>>(
-          graph.odometry.covariance.row(pose - 1).data()) = step.covariance;
-    }
-    graph.initial_poses.row(pose) = at.transpose();
+  graph.initial_poses.resize(num_poses(), Pose::kSize);
+  const int last = std::max(num_poses() - 1, 0);
+  graph.odometry.from = IndexVector::LinSpaced(last, 0, last - 1);
+  graph.odometry.to = IndexVector::LinSpaced(last, 1, last);
+  graph.odometry.relative.resize(last, Pose::kSize);
+  graph.odometry.covariance.resize(last, k * k);
+  Storage reckoned;
+  for (int pose = 0; pose < num_poses(); ++pose) {
+    const Step& step = steps[pose];
+    reckoned = pose > 0 ? Compose(reckoned, step.relative) : step.relative;
+    graph.initial_poses.row(pose) = reckoned.transpose();
+    if (pose == 0) continue;
+    graph.odometry.relative.row(pose - 1) = step.relative.transpose();
+    graph.odometry.covariance.row(pose - 1) =
+        step.covariance.template reshaped<Eigen::RowMajor>().transpose();
   }
+  const IndexVector boxes = BoxCounts();
+  std::vector<int> row_in_graph(num_objects(), -1);
   rows->clear();
-  std::vector<int> row_of_object(objects, -1);
-  for (int object = 0; object < objects; ++object) {
-    const std::vector<int>& own = history.objects[object].observations;
-    const bool has_box = std::any_of(
-        own.begin(), own.end(), [&](int row) { return history.observations[row].is_box; });
-    if (!has_box) continue;
-    row_of_object[object] = static_cast<int>(rows->size());
+  for (int object = 0; object < num_objects(); ++object) {
+    if (boxes[object] == 0) continue;
+    row_in_graph[object] = static_cast<int>(rows->size());
     rows->push_back(object);
   }
   graph.size_prior.log_mean.resize(rows->size());
   graph.size_prior.log_sigma.resize(rows->size());
   for (size_t row = 0; row < rows->size(); ++row) {
-    graph.size_prior.log_mean[row] = history.objects[(*rows)[row]].size.log_mean;
-    graph.size_prior.log_sigma[row] = history.objects[(*rows)[row]].size.log_sigma;
+    graph.size_prior.log_mean[row] = objects[(*rows)[row]].size.log_mean;
+    graph.size_prior.log_sigma[row] = objects[(*rows)[row]].size.log_sigma;
   }
-  const auto takes_part = [&](const Observation& observation) {
-    return !observation.Waits() && row_of_object[observation.object] >= 0;
-  };
-  int boxes = 0, positions = 0;
-  for (const Observation& observation : history.observations) {
-    if (takes_part(observation)) ++(observation.is_box ? boxes : positions);
+  const auto shown = OfKind(observations, row_in_graph, Observation::kBox);
+  Fill(shown, row_in_graph, kBoxSize, &graph.boxes, &graph.boxes.box);
+  graph.boxes.truncated.resize(graph.boxes.size(), kBoxSize);
+  for (size_t row = 0; row < shown.size(); ++row) {
+    graph.boxes.truncated.row(row) = shown[row]->truncated.transpose();
   }
-  graph.boxes = {IndexVector(boxes),
-                 IndexVector(boxes),
-                 RowMatrix(boxes, kBoxSize),
-                 RowMatrix(boxes, 16),
-                 BoolTable(boxes, kBoxSize)};
-  graph.measurements = {{"position",
-                         IndexVector(positions),
-                         IndexVector(positions),
-                         RowMatrix(positions, 3),
-                         RowMatrix(positions, 9)}};
-  boxes = positions = 0;
-  for (const Observation& observation : history.observations) {
-    if (!takes_part(observation)) continue;
-    const int object = row_of_object[observation.object];
-    if (observation.is_box) {
-      const Eigen::Matrix4d& W = observation.sqrt_information;
-      const Eigen::Matrix4d covariance = (W.transpose() * W).inverse();
-      graph.boxes.pose[boxes] = observation.pose;
-      graph.boxes.object[boxes] = object;
-      graph.boxes.box.row(boxes) = observation.value.transpose();
-      graph.boxes.covariance.row(boxes) =
-          Eigen::Map<const Eigen::Matrix<double, 1, 16>>(covariance.data());
-      graph.boxes.truncated.row(boxes++) = observation.truncated.transpose();
-    } else {
-      const Eigen::Matrix3d W = observation.sqrt_information.topLeftCorner<3, 3>();
-      const Eigen::Matrix3d covariance = (W.transpose() * W).inverse();
-      graph.measurements[0].pose[positions] = observation.pose;
-      graph.measurements[0].object[positions] = object;
-      graph.measurements[0].value.row(positions) = observation.value.head<3>().transpose();
-      graph.measurements[0].covariance.row(positions++) =
-          Eigen::Map<const Eigen::Matrix<double, 1, 9>>(covariance.data());
-    }
+  for (int kind = 0; kind < kNumMeasurementKinds; ++kind) {
+    const auto measured = OfKind(observations, row_in_graph, kind);
+    if (measured.empty()) continue;
+    MeasurementTable& table = graph.measurements.emplace_back();
+    table.kind = MeasurementName(kind);
+    Fill(measured, row_in_graph, MeasurementSize(kind), &table, &table.value);
   }
   return graph;
 }
 
-template Graph ToGraph<Se2>(const Model&, const History<Se2>&, std::vector<int>*);
-template Graph ToGraph<Se3>(const Model&, const History<Se3>&, std::vector<int>*);
+template Graph History<Se2>::ToGraph(std::vector<int>*) const;
+template Graph History<Se3>::ToGraph(std::vector<int>*) const;
 
 }  // namespace dqslam::online

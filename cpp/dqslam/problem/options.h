@@ -55,6 +55,9 @@ enum class Backend {
   kCeres,  ///< ceres::Solve on AutoDiff cost functions for every stage: slower, for comparison
 };
 
+/// 99 % and 99.9 % of chi-square with four degrees of freedom, the edges of a box.
+inline constexpr double kBoxChiSquare99 = 13.28, kBoxChiSquare999 = 18.47;
+
 struct SolveOptions {
   Mode mode = Mode::kSlam;
   Residual residual = Residual::kTangentThenBox;
@@ -66,7 +69,7 @@ struct SolveOptions {
   double loss_scale = 2.0;
   /// A box whose chi-square exceeds this is an outlier.  It is the threshold of all robust losses
   /// but Huber and Cauchy.  The default is the 99 % quantile with 4 degrees of freedom.
-  double outlier_chi_square = 13.28;
+  double outlier_chi_square = kBoxChiSquare99;
   /// Sigma of both algebraic residuals, in the unit of the residual.
   double algebraic_sigma = 1.0;
   Backend backend = Backend::kNative;

@@ -14,7 +14,7 @@ from dqslam._checks import Bools, Floats, Ints, as_covariances, reject_rows
 from dqslam.assumptions import BoxNoise
 from dqslam.online.integrated_odometry import identity_pose
 from dqslam.online.objects import Registry
-from dqslam.online.step import Motion, StepBoxes, StepPositions
+from dqslam.online.step import Motion, StepBoxes, StepMeasurements, StepPositions
 from dqslam.recording import as_poses, tangent_size
 
 Int32s = NDArray[np.int32]
@@ -122,16 +122,29 @@ def box_noise_rows(noise: BoxNoise, box: Floats) -> Floats:
     return rows
 
 
-def position_rows(
-    positions: StepPositions | None, registry: Registry
-) -> tuple[Int32s, Floats, Floats]:
-    """Return the rows of the objects (p,), their positions (p, 3) and covariances (p, 9)."""
-    if positions is None:
-        return np.zeros(0, dtype=np.int32), np.zeros((0, 3)), np.zeros((0, 9))
-    ids = np.asarray(positions.object_id).tolist()
+def measurement_tables(
+    positions: StepPositions | None, measurements: Sequence[StepMeasurements], registry: Registry
+) -> list[_core.MeasurementTable]:
+    """Return what was measured beside boxes, one table a kind, by the rows of the objects."""
+    given = list(measurements)
+    if positions is not None:
+        centers = StepMeasurements(
+            "position", positions.object_id, positions.object_in_robot, positions.covariance
+        )
+        given.insert(0, centers)
+    return [_measurement_table(one, registry) for one in given]
+
+
+def _measurement_table(given: StepMeasurements, registry: Registry) -> _core.MeasurementTable:
+    ids = np.asarray(given.object_id).tolist()
     unknown = [one for one in ids if one not in registry.row_of]
     if unknown:
-        raise ValueError(f"positions: object {unknown[0]} is not in the map yet")
-    rows = np.array([registry.row_of[one] for one in ids], dtype=np.int32)
-    covariance = np.asarray(positions.covariance, dtype=np.float64).reshape(len(ids), 9)
-    return rows, np.asarray(positions.object_in_robot, dtype=np.float64), covariance
+        raise ValueError(f"{given.kind}s: object {unknown[0]} is not in the map yet")
+    count = len(ids)
+    return _core.MeasurementTable(
+        kind=given.kind,
+        pose=np.zeros(count, dtype=np.int32),
+        object=np.array([registry.row_of[one] for one in ids], dtype=np.int32),
+        value=np.asarray(given.value, dtype=np.float64),
+        covariance=np.asarray(given.covariance, dtype=np.float64).reshape(count, -1),
+    )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from time import perf_counter
 
@@ -10,8 +10,8 @@ import numpy as np
 
 from dqslam import _core
 from dqslam.online.slam import OnlineSlam
-from dqslam.online.step import Motion, Step, StepBoxes, StepPositions
-from dqslam.recording import Recording, RelativePositions
+from dqslam.online.step import Motion, Step, StepBoxes, StepMeasurements, StepPositions
+from dqslam.recording import Measurements, Recording, RelativePositions
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +46,7 @@ def steps_of(recording: Recording) -> Iterator[Step]:
                 truncated=detections.truncated[rows],
             ),
             positions=_positions_at(recording.positions, pose),
+            measurements=_measurements_at(recording.measurements, pose),
         )
 
 
@@ -56,11 +57,24 @@ def _positions_at(positions: RelativePositions | None, pose: int) -> StepPositio
     return StepPositions(here.object_id, here.object_in_robot, here.covariance)
 
 
+def _measurements_at(measurements: Iterable[Measurements], pose: int) -> list[StepMeasurements]:
+    here = [(one, one.pose == pose) for one in measurements]
+    return [
+        StepMeasurements(one.kind, one.object_id[rows], one.value[rows], one.covariance[rows])
+        for one, rows in here
+        if rows.any()
+    ]
+
+
 def replay(slam: OnlineSlam, recording: Recording) -> Iterator[Frame]:
     """Feed a recording to a session, and yield how each step went."""
     for step in steps_of(recording):
         start = perf_counter()
         report = slam.add(
-            step.odometry, step.boxes, timestamp=step.timestamp, positions=step.positions
+            step.odometry,
+            step.boxes,
+            timestamp=step.timestamp,
+            positions=step.positions,
+            measurements=step.measurements,
         )
         yield Frame(step, report, 1e3 * (perf_counter() - start))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from concurrent.futures import Future
 from pathlib import Path
 from typing import Any, Self
@@ -25,7 +26,7 @@ from dqslam.online.readout import read_assignments, read_estimate, read_objects
 from dqslam.online.refinement import refine_all
 from dqslam.online.relocalize import Relocation, relocalize
 from dqslam.online.state import Settings, State
-from dqslam.online.step import Motion, StepBoxes, StepPositions
+from dqslam.online.step import Motion, StepBoxes, StepMeasurements, StepPositions
 from dqslam.online.stepping import take_step
 from dqslam.recording import pose_model_of, pose_size
 
@@ -139,6 +140,7 @@ class OnlineSlam:
         *,
         timestamp: float | None = None,
         positions: StepPositions | None = None,
+        measurements: Sequence[StepMeasurements] = (),
     ) -> _core.StepReport:
         """Add a step and bring the estimate up to date.
 
@@ -151,6 +153,8 @@ class OnlineSlam:
             that they clearly show, or to a new one once a few of them follow each other.
         timestamp
             Seconds, after that of the step before; by default one second later.
+        positions, measurements
+            What else was measured of objects that boxes have shown.
 
         Raises
         ------
@@ -163,19 +167,27 @@ class OnlineSlam:
                 hint = "slam.add(step.odometry, step.boxes, timestamp=step.timestamp)"
                 require(given, kind, "OnlineSlam.add", hint)
         if not len(self):
-            self._first_step = (boxes, timestamp, positions)
+            self._first_step = (boxes, timestamp, positions, measurements)
         elif self._may_leave_plane and odometry is not None:
             self._settle_pose_model(odometry)
         self._polisher.take()
-        return take_step(self._state, self._identifier, odometry, boxes, timestamp, positions)
+        return take_step(
+            self._state, self._identifier, odometry, boxes, timestamp, positions, measurements
+        )
 
     def _settle_pose_model(self, odometry: Motion) -> None:
         """Begin again in space if that is where the first motion is."""
         self._may_leave_plane = False
         if np.shape(odometry.relative) == (pose_size(_core.PoseModel.SE3),):
             space = OnlineSlam(**self._arguments | {"pose_model": _core.PoseModel.SE3})
-            boxes, timestamp, positions = self._first_step
-            space.add(None, boxes, timestamp=timestamp, positions=positions)
+            boxes, timestamp, positions, measurements = self._first_step
+            space.add(
+                None,
+                boxes,
+                timestamp=timestamp,
+                positions=positions,
+                measurements=measurements,
+            )
             vars(self).update(vars(space))
 
     # ------------------------------------------------------------------------------ estimate

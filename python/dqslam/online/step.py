@@ -49,6 +49,20 @@ class StepPositions:
 
 
 @dataclass(frozen=True, eq=False)
+class StepMeasurements:
+    """Other measurements of objects that boxes have shown, of one kind of the core."""
+
+    kind: str
+    """"range", or another kind with m numbers each."""
+    object_id: ArrayLike
+    """Shape (p,)."""
+    value: ArrayLike
+    """Shape (p, m)."""
+    covariance: ArrayLike
+    """Shape (p, m, m)."""
+
+
+@dataclass(frozen=True, eq=False)
 class Step:
     """All that arrives at one time."""
 
@@ -58,3 +72,4 @@ class Step:
     """None for the first step only."""
     boxes: StepBoxes | None = None
     positions: StepPositions | None = None
+    measurements: Sequence[StepMeasurements] = ()

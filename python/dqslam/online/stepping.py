@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from dqslam import _core
@@ -11,12 +13,12 @@ from dqslam.online.identify import Identifier
 from dqslam.online.inputs import (
     box_noise_rows,
     check_boxes,
+    measurement_tables,
     motion_arrays,
     next_time,
-    position_rows,
 )
 from dqslam.online.state import State
-from dqslam.online.step import Motion, StepBoxes, StepError, StepPositions
+from dqslam.online.step import Motion, StepBoxes, StepError, StepMeasurements, StepPositions
 from dqslam.recording import tangent_size
 
 
@@ -27,6 +29,7 @@ def take_step(
     boxes: StepBoxes | None,
     timestamp: float | None,
     positions: StepPositions | None,
+    measurements: Sequence[StepMeasurements],
 ) -> _core.StepReport:
     """Add a step to a session; see ``OnlineSlam.add``."""
     settings, registry = state.settings, state.registry
@@ -44,17 +47,16 @@ def take_step(
         priors = [state.prior.of(names[place]) for place in new]
         object_rows = np.full(len(checked.box), -1, dtype=np.int32)
         object_rows[known] = rows
-        report = state.core.add(
-            relative,
-            covariance,
-            object_rows,
-            checked.box,
-            box_noise_rows(settings.box_noise, checked.box),
-            checked.truncated,
-            *position_rows(positions, registry),
-            np.array([prior.log_mean for prior in priors]),
-            np.array([prior.log_sigma for prior in priors]),
+        observations = _core.StepObservations(
+            object=object_rows,
+            box=checked.box,
+            covariance=box_noise_rows(settings.box_noise, checked.box),
+            truncated=checked.truncated,
+            measurements=measurement_tables(positions, measurements, registry),
+            log_size_mean=np.array([prior.log_mean for prior in priors]),
+            log_size_sigma=np.array([prior.log_sigma for prior in priors]),
         )
+        report = state.core.add(relative, covariance, observations)
     except (ValueError, TypeError) as error:
         raise StepError(f"step {count}: {error}") from None
     registry.register(ids[place] for place in new)
