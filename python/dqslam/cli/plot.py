@@ -17,7 +17,7 @@ from dqslam.cli.settings import ConfigFile, save_settings
 if TYPE_CHECKING:
     from dqslam.io import FrameTimes, Results
 
-_STILLS = 9  # spread evenly, where no frames are asked for
+_STILLS = 9  # number of images, evenly spread, if no frames are given
 
 
 def plot(
@@ -78,8 +78,8 @@ def plot(
 ) -> None:
     """Draw the results in DIR: the map from above, errors over time, residuals, boxes.
 
-    Of a sweep, its errors against what was varied. Needs the extra "plot"; docs/plots.md says what
-    each figure shows. Writes its options, plot.toml, beside them.
+    For a sweep, it draws the errors against the varied settings. It needs the extra "plot";
+    docs/plots.md describes each figure. The options go into plot.toml beside the figures.
     """
     from dqslam import io
 
@@ -102,7 +102,7 @@ def plot(
         results = io.load_results(results_in(directory))
         groundtruth, objects = truth_of(results.directory, groundtruth, objects)
         shown: dict[int, Path] = {}
-        if images is not None:  # before anything is written: can they be told apart?
+        if images is not None:  # check the images before anything is written
             times = _frame_times(frame_times, frame_rate)
             shown = _choose(
                 frames, io.find_images(images, results.timestamps, times), is_film=video is not None
@@ -182,7 +182,7 @@ def _overlay(
     rate: float | None,
     output: Output,
 ) -> list[Path]:
-    """Write images, by their poses, with what the map has of them: the files."""
+    """Write images, by their poses, with the objects of the map; return the files."""
     from dqslam.evaluation import fit_boxes
     from dqslam.plot.overlay import Overlay, save_stills, save_video, usual_rate
 
@@ -196,7 +196,7 @@ def _overlay(
 
 
 def _choose(frames: str | None, images: dict[int, Path], *, is_film: bool) -> dict[int, Path]:
-    """Return the images that are asked for; without any asking all of a film, else a few."""
+    """Return the selected images; by default all for a film, else a few."""
     poses = sorted(images)
     if frames is None and (is_film or len(poses) <= _STILLS):
         return {pose: images[pose] for pose in poses}
@@ -216,7 +216,7 @@ def _choose(frames: str | None, images: dict[int, Path], *, is_film: bool) -> di
 
 
 def _span(part: str) -> range:
-    """Return the poses of "7", "7-20" or "7-20:5", ends included."""
+    """Return the poses of "7", "7-20" or "7-20:5", with both ends."""
     try:
         ends, _, step = part.partition(":")
         first, dash, last = ends.partition("-")

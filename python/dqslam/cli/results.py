@@ -1,4 +1,4 @@
-"""Where a command writes: the directory of its results, all of them or none."""
+"""The directory of a command's results, which are written all or not at all."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class Table(Protocol):
-    """What a study comes to."""
+    """The table of a study."""
 
     def save(self, path: Path) -> None:
         """Write it as JSON."""
@@ -30,7 +30,7 @@ SomeTable = TypeVar("SomeTable", bound=Table)
 
 @contextmanager
 def results_directory(path: Path) -> Iterator[None]:
-    """Make a directory before the work is done; if that fails, leave none that is empty."""
+    """Make a directory before the work starts; if the work fails, remove it if it is empty."""
     missing = [one for one in (path, *path.parents) if not one.exists()]
     path.mkdir(parents=True, exist_ok=True)
     try:
@@ -44,7 +44,7 @@ def results_directory(path: Path) -> Iterator[None]:
 
 @contextmanager
 def uninterrupted() -> Iterator[None]:
-    """Put off Ctrl-C until all files of a result are there, which belong together."""
+    """Delay Ctrl-C until all files of a result are written, because they belong together."""
     in_main = threading.current_thread() is threading.main_thread()
     if not in_main or signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
         yield
@@ -60,7 +60,7 @@ def uninterrupted() -> Iterator[None]:
 
 
 def draw_figure(output: Output, path: Path, draw: Callable[[Path], None]) -> None:
-    """Draw an image file, or say why there is none: figures are an extra."""
+    """Draw an image file, or print why there is none, because figures are an extra."""
     if find_spec("matplotlib") is None:
         output.line(f"no {path.name}: matplotlib is missing (pip install 'dqslam[plot]')")
         return

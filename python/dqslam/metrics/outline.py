@@ -5,8 +5,8 @@ import numpy as np
 from dqslam import _core
 from dqslam._checks import Floats
 
-POINTS = 128  # an outline 600 px across is then off by 0.1 px at most between two of them
-_AROUND = 0.5  # of the image's size: a lens is not believed further outside of the image
+POINTS = 128  # an outline of 600 px then has an error of at most 0.1 px between points
+_AROUND = 0.5  # share of the image's size: the lens model is not used farther outside
 
 
 def project_outlines(
@@ -18,16 +18,16 @@ def project_outlines(
 ) -> Floats:
     """Return the outline of ellipsoid i from pose i in undistorted pixels, shape (m, points, 2).
 
-    The image of the dual quadric is the dual conic C* = P Q* P^T, that of an ellipse with center c
-    and shape S: C* ~ S - c c^T. The last point is the first again.
+    The image of the dual quadric is the dual conic C* = P Q* P^T of an ellipse with center c and
+    shape S, where C* ~ S - c c^T. The last point equals the first.
 
     Parameters
     ----------
     world_from_camera
         Shape (m, 7); the camera has no mount.
     ellipsoids
-        Center and log-Cholesky shape, shape (m, 9). An outline is NaN where this is, and where the
-        ellipsoid is not strictly in front of the camera: there it is no ellipse.
+        Center and log-Cholesky shape, shape (m, 9). An outline is NaN where these are NaN, and
+        where the ellipsoid is not strictly in front of the camera, because it is no ellipse there.
     """
     from scipy.spatial.transform import Rotation
 
@@ -52,7 +52,7 @@ def project_outlines(
     angle = np.linspace(0.0, 2.0 * np.pi, points)
     circle = np.column_stack([np.cos(angle), np.sin(angle)])
     squares, along = np.linalg.eigh(shape)
-    radii = np.sqrt(squares.clip(min=0.0))  # a speck far away may round to less than nothing
+    radii = np.sqrt(squares.clip(min=0.0))  # rounding may make the square of a tiny one negative
     outlines[real] = middle[:, None] + circle @ (along * radii[:, None]).swapaxes(1, 2)
     return outlines
 
@@ -60,7 +60,7 @@ def project_outlines(
 def through_lens(camera: _core.Camera, outlines: Floats) -> Floats:
     """Return outlines (..., 2) in the pixels of the image as recorded, which the lens distorts.
 
-    NaN well outside of the image, where the polynomials of the lens mean nothing.
+    They are NaN well outside of the image, where the polynomials of the lens are not valid.
     """
     if not camera.has_distortion:
         return outlines
@@ -73,7 +73,7 @@ def through_lens(camera: _core.Camera, outlines: Floats) -> Floats:
 
 
 def boxes_through_lens(camera: _core.Camera, boxes: Floats) -> Floats:
-    """Return boxes (m, 4) in the pixels of the image as recorded: each edge at its middle."""
+    """Return boxes (m, 4) in the pixels of the image as recorded, each edge taken at its middle."""
     if not camera.has_distortion:
         return boxes
     u_min, v_min, u_max, v_max = boxes.T

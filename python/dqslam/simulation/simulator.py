@@ -1,4 +1,4 @@
-"""Simulated recordings: from a scenario and a seed to what a robot would have recorded."""
+"""Simulated recordings: from a scenario and a seed to the recording of a robot."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -38,9 +38,9 @@ def simulate(scenario: Scenario, *, seed: int) -> tuple[Recording, Truth]:
     """Move through a world of objects and record odometry, boxes and relative positions.
 
     World, odometry, boxes, positions, wrong ids and path each have a random stream of their own,
-    and every pair of pose and object its own numbers: changing one setting leaves the others' noise
-    as it was. Objects are in the recording only if they were detected; the truth has all. Wrong are
-    the ids of boxes only; a relative position is always its object's.
+    and every pair of pose and object has its own numbers. A change of one setting therefore does
+    not change the noise of the others. The recording has only the detected objects; the truth has
+    all. Only ids of boxes can be wrong; a relative position always has the right object.
     """
     if seed < 0:
         raise ValueError(f"seed: expected zero or more, got {seed}")
@@ -136,7 +136,7 @@ def _log_normal(
     from scipy.spatial.transform import Rotation
 
     normal = random.normal(size=(count, 3, 3))
-    # Symmetric, with variance 1 on the diagonal and 1/2 beside it: alike from any side.
+    # Symmetric, with variance 1 on the diagonal and 1/2 off it, so that it is isotropic.
     logarithm, axes = np.linalg.eigh((normal + normal.transpose(0, 2, 1)) / 2.0)
     axes[:, :, 0] *= np.linalg.det(axes)[:, None]  # right-handed
     semi_axes = size.median_m * size.spread**logarithm
@@ -144,7 +144,7 @@ def _log_normal(
 
 
 def _half_height(semi_axes: Floats, orientation: Floats) -> Floats:
-    """Return how far ellipsoids go up from their centers, m, (o,)."""
+    """Return the height of the top of ellipsoids above their centers, m, (o,)."""
     from scipy.spatial.transform import Rotation
 
     up_in_object = Rotation.from_quat(orientation).inv().apply(_UP)

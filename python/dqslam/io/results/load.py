@@ -1,4 +1,4 @@
-"""Read back what ``save_estimate`` wrote."""
+"""Read the files that ``save_estimate`` wrote."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from dqslam.io.trajectory import read_trajectory
 
 @dataclass(frozen=True, eq=False)
 class MapObjects:
-    """The objects of ``map.json``, rows in its order."""
+    """The objects of ``map.json``, in its order."""
 
     id: Ints
     """Shape (o,)."""
@@ -34,13 +34,13 @@ class MapObjects:
     orientation_xyzw: Floats
     """world_from_object, shape (o, 4); NaN where it is no ellipsoid."""
     observations: Ints
-    """Boxes that were used, shape (o,)."""
+    """Number of boxes that were used, shape (o,)."""
     center_covariance: Floats
     """Square meters, shape (o, 3, 3); NaN where unknown."""
     log_semi_axes_sigma: Floats
-    """Of the natural logarithms of the semi-axes, shape (o, 3); NaN where unknown."""
+    """Sigma of the natural logarithms of the semi-axes, shape (o, 3); NaN where unknown."""
     dropped: Mapping[int, str] = field(default_factory=dict)
-    """Ids of objects that were not mapped, and why."""
+    """Reason for each object that was not mapped, by its id."""
 
     def __len__(self) -> int:
         """Return the number of objects."""
@@ -67,21 +67,21 @@ class Results:
 
     directory: Path
     camera: _core.Camera
-    """Without the mount on the robot: the poses are the camera's."""
+    """The camera without a mount, because the poses are those of the camera."""
     timestamps: Floats
     """Seconds, shape (n,)."""
     world_from_camera: Floats
-    """Estimated, shape (n, 7)."""
+    """Estimated poses, shape (n, 7)."""
     odometry: Floats
-    """world_from_camera that the estimate started from, shape (n, 7)."""
+    """Initial poses world_from_camera, shape (n, 7)."""
     covariance: Floats
-    """Of the poses in the frame of the camera, x y z [m] and rotation vector [rad], the first pose
-    being exact; shape (n, 6, 6), NaN where unknown."""
+    """Covariances of the poses in the frame of the camera, x y z [m] and rotation vector [rad]; the
+    first pose is exact. Shape (n, 6, 6), NaN where unknown."""
     objects: MapObjects
     boxes: BoxTable | None
-    """None without ``boxes.csv``."""
+    """The boxes, or None without ``boxes.csv``."""
     report: Mapping[str, Any]
-    """``report.json``, empty without it."""
+    """The content of ``report.json``, empty without it."""
 
 
 def load_results(directory: str | Path) -> Results:

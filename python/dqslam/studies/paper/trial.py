@@ -31,17 +31,17 @@ from dqslam.studies.paper.scores import (
 
 @dataclass(frozen=True)
 class Outcome:
-    """One solve of one trial: a report, or why there is none."""
+    """One solve of one trial: a report, or the reason why there is none."""
 
     report: Report | None
     seconds: float
-    """Wall clock of building and solving the problem."""
+    """Wall-clock time to build and solve the problem."""
     failure: str = ""
     bound: BoundScore | None = None
     robust: RobustScore | None = None
-    """Where some ids are wrong."""
+    """The score of the robust loss if some ids are wrong."""
     iterations: int = 0
-    """Of all stages of the solver."""
+    """Iterations of all stages of the solver."""
     converged: bool = False
 
 
@@ -51,12 +51,12 @@ class Trial:
 
     seed: int
     odometry_rmse_pos: float
-    """Meters."""
+    """RMSE_pos of odometry alone, meters."""
     outcomes: dict[RowName, tuple[Outcome, ...]]
 
 
 def run_trial(scenario: Scenario, seed: int, settings: Settings) -> Trial:
-    """Simulate one seed and solve each row with each sigma; a solve may fail, and is kept."""
+    """Simulate one seed and solve each row with each sigma; failed solves are kept as failures."""
     recording, truth = simulate(scenario, seed=seed)
     odometry = recording.odometry
     poses = _core.dead_reckon(odometry.pose_model, odometry.first_pose, odometry.relative)
@@ -90,12 +90,12 @@ def solve_and_score(
     told: SolveOptions,
     bound: bool,
 ) -> Outcome:
-    """Solve what an estimator is given and compare it with the truth.
+    """Solve a problem and compare the estimate with the truth.
 
     Parameters
     ----------
     told
-        Options of the run that is told which ids are right, without a loss; where some are wrong.
+        If some ids are wrong: options of the run that knows the right ones and has no loss.
     bound
         Whether to compare with the posterior bound and the optimum too.
     """
@@ -122,6 +122,6 @@ def solve_and_score(
             iterations=summary.iterations,
             converged=summary.converged,
         )
-    except Exception as error:  # whatever it was: counted, shown and never dropped
+    except Exception as error:  # any error is counted and shown
         seconds = time.perf_counter() - start if seconds is None else seconds
         return Outcome(None, seconds, f"{type(error).__name__}: {error}")
