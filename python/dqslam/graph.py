@@ -1,4 +1,4 @@
-"""From a recording to the plain arrays the core solves, and back to an estimate."""
+"""From a recording to the plain arrays that the core solves, and back to an estimate."""
 
 from dataclasses import dataclass
 
@@ -11,17 +11,18 @@ from dqslam.assumptions import BoxNoise, SizePrior, SizePriors
 from dqslam.estimate import Estimate
 from dqslam.recording import Detections, Measurements, Recording
 
-# Two boxes do not tell an object's distance from its size.
+# With only two boxes, an object's distance and size cannot be separated.
 FEWEST_INLIER_VIEWS = 3
-# A few boxes fit some ellipsoid even if all of them are wrong: so many must, or that share of all
-# if that is fewer. Of a moved object, a small share of many boxes may fit at one of its places.
+# A few boxes fit some ellipsoid even if all of them are wrong. Therefore at least this number of
+# boxes must fit, or this share of all boxes if that is fewer. A small share is not enough, because
+# it may be the boxes of a moved object at one of its places.
 ENOUGH_INLIERS = 6
 ENOUGH_INLIER_SHARE = 1.0 / 3.0
 
 
 @dataclass(frozen=True, eq=False)
 class Graph:
-    """The problem as arrays for the core, and what its rows are called."""
+    """The problem as arrays for the core, and the names of its rows."""
 
     core: _core.Graph
     timestamps: Floats
@@ -29,9 +30,9 @@ class Graph:
     object_ids: Ints
     """Id of each object row, ascending, shape (o,)."""
     class_names: tuple[str, ...]
-    """One per object: the class most of its boxes have."""
+    """The class of most boxes of each object."""
     observations: Ints
-    """Boxes per object, shape (o,)."""
+    """Number of boxes of each object, shape (o,)."""
 
     def __repr__(self) -> str:
         """Show the pose model, and how many poses, boxes and objects there are."""
@@ -53,15 +54,15 @@ def build_graph(
     Parameters
     ----------
     box_noise, size_prior
-        What is assumed of boxes and objects; a table of size priors has one per class.
+        Assumptions about boxes and objects; a table of size priors has one for each class.
     scene_priors
-        What is known of the scene, by default nothing: that objects are upright, or stand on the
-        ground, or how high the camera is.
+        Knowledge of the scene, by default none: whether objects are upright or stand on the
+        ground, and the height of the camera.
 
     Raises
     ------
     ValueError
-        When there are no boxes, one has no object id, a relative position belongs to an object
+        If there are no boxes, a box has no object id, a relative position belongs to an object
         without boxes, a size prior to a class without boxes, or the core refuses the problem.
 
     Examples
@@ -166,7 +167,7 @@ def solve(
 
 
 def _unfit(graph: Graph, inliers: Bools) -> dict[int, str]:
-    """Say by id which objects too few boxes fit, and how few."""
+    """Return the objects that too few boxes fit, with the reason by id."""
     views = _inlier_views(graph.core, inliers)
     fit = np.bincount(graph.core.boxes.object[inliers], minlength=len(views))
     needed = np.ceil(np.minimum(ENOUGH_INLIERS, ENOUGH_INLIER_SHARE * graph.observations))
@@ -184,7 +185,7 @@ def _unfit(graph: Graph, inliers: Bools) -> dict[int, str]:
 
 
 def _inlier_views(core: _core.Graph, inliers: Bools) -> Ints:
-    """Return from how many poses boxes that fit show each object, shape (o,)."""
+    """Return the number of poses with a fitting box of each object, shape (o,)."""
     pairs = np.column_stack([core.boxes.object, core.boxes.pose])[inliers]
     seen = np.unique(pairs, axis=0)
     return np.bincount(seen[:, 0], minlength=core.num_objects)
@@ -193,7 +194,7 @@ def _inlier_views(core: _core.Graph, inliers: Bools) -> Ints:
 def _size_priors(
     given: SizePrior | SizePriors | None, class_names: tuple[str, ...], detections: Detections
 ) -> list[SizePrior]:
-    """Return the prior of each object, by the names of their classes (o,)."""
+    """Return the prior of each object, for their class names (o,)."""
     if isinstance(given, SizePriors):
         given.check_classes(set(detections.class_names.values()))
         return [given.of(name) for name in class_names]
@@ -220,7 +221,7 @@ def _class_names(detections: Detections, box_object: Ints, objects: int) -> tupl
 
 
 def _measurements(recording: Recording) -> list[Measurements]:
-    """Return what was measured beside boxes, the kind of positions first."""
+    """Return the measurements other than boxes, positions first."""
     positions = recording.positions
     if positions is None:
         return list(recording.measurements)

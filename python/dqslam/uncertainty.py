@@ -1,6 +1,6 @@
-"""How uncertain an estimate is, and how good one could be: covariances and their bound.
+"""The uncertainty of an estimate, and the best that is possible: covariances and their bound.
 
-Gauge: the first pose is fixed; everything is relative to it.
+The gauge is the first pose: it is fixed, and everything is relative to it.
 """
 
 from dataclasses import dataclass
@@ -26,10 +26,10 @@ class UnderConstrained:
     name: int
     """Row of the pose, or id of the object."""
     parameter: int
-    """Of its tangent."""
+    """Index of the parameter in the tangent of the pose or the object."""
 
     def __str__(self) -> str:
-        """Say it in a sentence."""
+        """Describe it in a sentence."""
         return (
             f"{self.kind} {self.name}: parameter {self.parameter} is not determined by the data "
             "and the priors"
@@ -38,14 +38,14 @@ class UnderConstrained:
 
 @dataclass(frozen=True, eq=False)
 class Marginals:
-    """Marginal covariances of each pose and object; NaN where one is under-constrained."""
+    """Marginal covariances of each pose and object; NaN for one that is under-constrained."""
 
     poses: Floats
-    """In the frame of each pose, translation [m] first, then rotation [rad]; (n, k, k)."""
+    """Covariances in the frame of each pose, translation [m] before rotation [rad]; (n, k, k)."""
     objects: Floats
-    """Of center [m] and log-Cholesky shape, shape (o, 9, 9)."""
+    """Covariances of center [m] and log-Cholesky shape, shape (o, 9, 9)."""
     under_constrained: tuple[UnderConstrained, ...]
-    """One entry for each pose and object that nothing determines."""
+    """One entry for each pose and object with an undetermined parameter."""
 
     def __repr__(self) -> str:
         """Show how many poses and objects there are, and of how many nothing is known."""
@@ -63,10 +63,10 @@ class Marginals:
 
 @dataclass(frozen=True, eq=False)
 class Bound:
-    """The posterior Cramer-Rao bound: what no unbiased estimator can beat on average."""
+    """The posterior Cramer-Rao bound, which no unbiased estimator can beat on average."""
 
     covariance: Marginals
-    """At the truth."""
+    """The covariances at the truth."""
     position_error: float
     """Expected mean distance of the poses from their true places (RMSE_pos), meters."""
 
@@ -76,7 +76,7 @@ def marginal_covariances(
 ) -> Marginals:
     """Return the covariances of an estimate's poses and mapped objects.
 
-    The options are those of the solve; with a robust loss, boxes that do not fit take no part.
+    The options are those of the solve. With a robust loss, boxes that do not fit are left out.
     """
     call = "marginal_covariances"
     require(graph, Graph, call, "marginal_covariances(graph, estimate)")
@@ -92,8 +92,8 @@ def marginal_covariances(
 def posterior_bound(graph: Graph, truth: Truth) -> Bound:
     """Return the bound for a problem, from its covariances at the truth.
 
-    Objects that are no ellipsoids have no true parameters: what mapping finds at the true poses
-    stands in. Ids are taken for right.
+    Objects that are not ellipsoids have no true parameters, so the result of mapping at the true
+    poses replaces them. Ids are assumed to be right.
     """
     require(graph, Graph, "posterior_bound", "call build_graph(recording) first")
     require(truth, Truth, "posterior_bound", "recording, truth = simulate(scenario, seed=0)")
@@ -106,9 +106,9 @@ def posterior_bound(graph: Graph, truth: Truth) -> Bound:
 
 
 def true_state(graph: Graph, truth: Truth, options: SolveOptions) -> _core.State:
-    """Return the true poses and objects of a problem, the latter mapped if they are no ellipsoids.
+    """Return the true poses and objects of a problem, mapped if they are not ellipsoids.
 
-    For the ellipsoid model.
+    The objects have the parameters of the ellipsoid model.
     """
     if truth.ellipsoids is not None:
         return _core.State(truth.poses, truth.ellipsoids[true_rows(graph.object_ids, truth)])
@@ -120,8 +120,8 @@ def true_state(graph: Graph, truth: Truth, options: SolveOptions) -> _core.State
 def expected_distance(covariances: Floats) -> Floats:
     """Return the mean length of zero-mean Gaussian vectors of covariance (n, k, k), k up to 3.
 
-    With eigenvalues l it is 2 sqrt(2 / pi) R_G(l1, l2, l3): the mean over directions of the
-    spread, Carlson's R_G, times the mean of chi with three degrees of freedom.
+    With eigenvalues l it is 2 sqrt(2 / pi) R_G(l1, l2, l3). Carlson's R_G is the mean of the
+    spread over directions, and the factor is the mean of chi with three degrees of freedom.
     """
     from scipy.special import elliprg
 
@@ -140,7 +140,7 @@ def normalized_squares(errors: Floats, covariances: Floats) -> Floats:
 
 
 def chi_square_interval(freedom: int) -> list[float]:
-    """Return where 95 % of chi-squares of these degrees of freedom lie, divided by them."""
+    """Return the interval of 95 % of chi-squares, divided by their degrees of freedom."""
     from scipy.stats import chi2
 
     return [float(chi2.ppf(share, freedom) / freedom) for share in (0.025, 0.975)]
@@ -172,7 +172,7 @@ def _rebuilt(core: _core.Graph, **changes: Any) -> _core.Graph:
 
 
 def _only_objects(core: _core.Graph, kept: Bools) -> _core.Graph:
-    """Return a problem without the other objects, kept (o,), and what was measured of them."""
+    """Return a problem with the objects `kept` (o,) only, and with their measurements only."""
     row = np.cumsum(kept) - 1
     boxes, prior = core.boxes, core.size_prior
     box = kept[boxes.object]

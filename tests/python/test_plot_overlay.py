@@ -175,7 +175,7 @@ def test_what_is_no_image_is_named(tmp_path, results):
         Overlay(results).draw(1, path)
 
 
-def test_a_grey_image_stays_grey(tmp_path, results):
+def test_a_gray_image_stays_gray(tmp_path, results):
     Image.new("L", SIZE, 77).save(tmp_path / "gray.png")
     (path,) = save_stills(Overlay(results), {0: tmp_path / "gray.png"}, tmp_path / "out")
     pixels = np.asarray(Image.open(path).convert("RGB"))

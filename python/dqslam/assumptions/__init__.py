@@ -1,4 +1,4 @@
-"""What is assumed before anything is seen: sizes of objects, noise of boxes and odometry."""
+"""Prior assumptions: sizes of objects, and noise of boxes and odometry."""
 
 from dqslam.assumptions.noise import BoxNoise as BoxNoise
 from dqslam.assumptions.noise import OdometryNoise as OdometryNoise

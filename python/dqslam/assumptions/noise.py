@@ -1,4 +1,4 @@
-"""How far measurements are believed to be off: the edges of boxes, the steps of odometry."""
+"""The assumed noise of measurements: the edges of boxes and the steps of odometry."""
 
 from dataclasses import dataclass
 
@@ -7,22 +7,23 @@ import numpy as np
 from dqslam._checks import Floats
 from dqslam._core import PoseModel
 
-# Odometry outside of this is exact or worthless, and squares badly.
+# Sigmas of odometry outside of this range mean exact or useless odometry, and their squares are
+# badly conditioned.
 SIGMAS = (1e-9, 1e6)
 
 
 @dataclass(frozen=True)
 class BoxNoise:
-    """How far a box edge lies from the outline of an ellipsoid.
+    """The distance of a box edge from the outline of an ellipsoid.
 
-    sigma = hypot(pixels, relative * side of the box across that edge): a detector's noise, and a
-    part that grows with the box because real objects, cubes among them, are no ellipsoids.
+    sigma = hypot(pixels, relative * side of the box across that edge). The first part is the
+    detector's noise. The second part grows with the box, because real objects are not ellipsoids.
     """
 
     pixels: float = 2.0
-    """Sigma, pixels."""
+    """Constant part of sigma, pixels."""
     relative: float = 0.05
-    """Sigma over side length of the box."""
+    """Part of sigma that is proportional to the side of the box, as a share of the side."""
 
     def covariance(self, box: Floats) -> Floats:
         """Return the covariance [px^2] of u_min, v_min, u_max, v_max, shape (b, 4, 4)."""
@@ -37,13 +38,13 @@ class BoxNoise:
 
 @dataclass(frozen=True)
 class OdometryNoise:
-    """Standard deviations of one step of odometry, each axis: meters and radians."""
+    """Standard deviations of one step of odometry on each axis, in meters and radians."""
 
     translation_m: float = 0.01
     rotation_rad: float = 0.005
 
     def __post_init__(self) -> None:
-        """Refuse what is no standard deviation."""
+        """Refuse values that are not standard deviations."""
         for name, sigma in (("translation", self.translation_m), ("rotation", self.rotation_rad)):
             if not SIGMAS[0] <= sigma <= SIGMAS[1]:
                 raise ValueError(

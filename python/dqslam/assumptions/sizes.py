@@ -1,4 +1,4 @@
-"""How large objects are before any is seen: one prior for all, or a table of one per class."""
+"""Prior sizes of objects: one prior for all, or a table with one for each class."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
@@ -13,12 +13,12 @@ from dqslam.config import load_toml_model
 
 @dataclass(frozen=True)
 class SizePrior:
-    """A log-normal semi-axis, broad on purpose."""
+    """A log-normal prior on the semi-axes, which is broad on purpose."""
 
     log_mean: float = float(np.log(0.3))
-    """Log of the median semi-axis in meters."""
+    """Natural logarithm of the median semi-axis in meters."""
     log_sigma: float = 0.7
-    """Sigma of the log."""
+    """Standard deviation of the logarithm."""
 
     def of(self, class_name: str) -> Self:
         """Return the prior of a class: all have the same."""
@@ -37,7 +37,7 @@ class SizePriors:
         return self.classes.get(class_name, self.default)
 
     def check_classes(self, known: Collection[str]) -> None:
-        """Raise a ValueError that names the first class which is not known, and those that are."""
+        """Raise a ValueError that names the first unknown class and the known ones."""
         for name in self.classes:
             if name not in known:
                 names = ", ".join(sorted(known))
@@ -62,14 +62,15 @@ class _Table(BaseModel):
 def load_size_priors(path: str | Path) -> SizePriors:
     """Read a table of size priors from a TOML file.
 
-    It has a part ``[classes.NAME]`` for each class and may have one for all others, ``[default]``,
-    each with ``median_m``, the median semi-axis in meters, and ``spread``, a factor above 1: two
-    of three semi-axes are between median / spread and median * spread.
+    It has a table ``[classes.NAME]`` for each class and may have a table ``[default]`` for all
+    others. Each has ``median_m``, the median semi-axis in meters, and ``spread``, a factor above 1:
+    two of three semi-axes are between median / spread and median * spread.
 
     Raises
     ------
     FileError
-        When the file is missing, or no such table; names the line of every wrong setting.
+        If the file is missing or is not such a table; the error names the line of every wrong
+        setting.
     """
     table = load_toml_model(path, _Table)
     classes = {name: entry.prior() for name, entry in table.classes.items()}

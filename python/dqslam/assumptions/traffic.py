@@ -1,7 +1,7 @@
-"""How large the things are that move by themselves: what tells a car at rest from one that comes.
+"""The usual sizes of things that move by themselves, which help to recognize a moving car.
 
-What moves along a straight line while the camera does looks like a thing at rest, at another
-distance and hence of another size. Only its true size tells.
+An object that moves along a straight line, while the camera does too, looks like an object at rest
+at another distance, and hence of another size. Only its true size shows the difference.
 """
 
 import tomllib
@@ -10,15 +10,15 @@ from pathlib import Path
 
 import numpy as np
 
-# An ellipsoid that explains the boxes of a box-shaped object is larger than the one inscribed:
-# by 4/pi where it is seen from around, by 1 in height.
+# An ellipsoid that explains the boxes of a box-shaped object is larger than the inscribed one: by a
+# factor of 4/pi horizontally, if it is seen from all around, but not in height.
 SWELLING = float((4.0 / np.pi) ** (2.0 / 3.0))
 
 
 def usual_size(class_name: str) -> float | None:
-    """Return the mean logarithm of the semi-axes [log m] of what moves by itself; None for others.
+    """Return the mean logarithm of the semi-axes [log m] of a moving class; None for other classes.
 
-    Of the ellipsoids that explain its boxes.
+    The semi-axes are those of the ellipsoids that explain the boxes of the class.
     """
     return _table().get(class_name.lower())
 
@@ -26,7 +26,7 @@ def usual_size(class_name: str) -> float | None:
 @cache
 def _table() -> dict[str, float]:
     here = Path(__file__).resolve()
-    # In the installed package, or in a checkout.
+    # The file is in the installed package or in a checkout.
     roots = (here.parents[1], here.parents[3])
     places = [root / "data" / "sizes" / "traffic.toml" for root in roots]
     file = next(place for place in places if place.is_file())

@@ -1,6 +1,6 @@
-"""The command line: a module per command, put together here; the only part that prints.
+"""The command line: one module per command, combined here. It is the only part that prints.
 
-A command's module imports nothing heavy but inside its functions: `dqslam --help` must not wait.
+A command's module has heavy imports only inside its functions, so that `dqslam --help` is fast.
 """
 
 import sys
@@ -24,7 +24,7 @@ from dqslam.cli.simulate import simulate
 from dqslam.cli.sweep import sweep
 from dqslam.cli.view import view
 
-# The table of contents: commands in the order of the help, by the title of their panel.
+# The commands in the order of the help, by the title of their panel.
 COMMANDS: dict[str, tuple[Callable[..., None], ...]] = {
     "Start here": (demo, paper, simulate),
     "Your recording": (inspect, convert, run, evaluate),
@@ -69,15 +69,15 @@ for _panel, _commands in COMMANDS.items():
 
 _INTERRUPTED = 130
 _BAD_INPUT = 2
-# UsageError has no public name in typer; it is what BadParameter derives from.
+# UsageError, the base of BadParameter, has no public name in typer.
 _UsageError: Any = typer.BadParameter.__mro__[1]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command and return its exit code, one of `EXIT_CODES`.
 
-    Bad input is one line on stderr, a file of settings one for each mistake; an error that is ours
-    keeps its traceback.
+    Bad input gives one line on stderr; a file of settings gives one for each mistake. An error of
+    our own keeps its traceback.
     """
     try:
         code = app(arguments, prog_name="dqslam", standalone_mode=False) or 0
@@ -86,7 +86,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (_UsageError, ValueError, OSError, RuntimeError) as error:
         message = error.format_message() if isinstance(error, _UsageError) else str(error)
         for mistake in message.splitlines() if isinstance(error, FileErrors) else [message]:
-            if mistake:  # a bare `dqslam` has shown its help already
+            if mistake:  # a bare `dqslam` has already shown its help
                 _say(mistake)
         code = _BAD_INPUT
     if code == _INTERRUPTED:

@@ -1,4 +1,4 @@
-"""``dqslam ablation``: what each part of the estimator is worth."""
+"""``dqslam ablation``: the value of each part of the estimator."""
 
 import os
 from typing import TYPE_CHECKING, Annotated
@@ -51,7 +51,7 @@ def ablation(
 
 
 def _results(table: "AblationTable") -> "Table":
-    """Lay out a block for each residual, then one for each kind of wrong ids."""
+    """Return the table: a block for each residual, then one for each kind of wrong ids."""
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
@@ -59,7 +59,7 @@ def _results(table: "AblationTable") -> "Table":
         title=f"seeds {table.seed} to {table.seed + table.trials - 1}, ellipsoids, monocular; "
         "errors over the posterior bound",
         box=SIMPLE_HEAD,
-        padding=(0, 1, 0, 0),  # eighty columns hold it
+        padding=(0, 1, 0, 0),  # fits into eighty columns
     )
     shown.add_column("variant", no_wrap=True)
     for heading in ("optimum", "mean", "median", "iterations", "seconds", "failed"):

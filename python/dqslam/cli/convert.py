@@ -42,10 +42,10 @@ def convert(
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
-    """Write a camera, a trajectory or detections in another format; a bag as a folder of all.
+    """Convert a camera, a trajectory or detections to another format, or a bag to a folder.
 
     Formats: json toml ros colmap kitti-calib | tum kitti euroc | csv coco yolo mot | rosbag (read).
-    Times that OUT has no place for go into a file beside it.
+    If the format of OUT has no times, they go into a file beside it.
     """
     from dqslam import io
 

@@ -25,7 +25,7 @@ def degeneracy(
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
-    """Look at objects along four motions on the plane, poses known, and solve from three starts.
+    """Observe objects along four motions on the plane, poses known, and solve from three starts.
 
     Writes degeneracy.json, degeneracy.png and config.toml.
     """
@@ -40,7 +40,7 @@ def degeneracy(
 
 
 def _results(table: "DegeneracyTable") -> "Table":
-    """Lay out a block for each motion: its weakest singular values, then all methods."""
+    """Return the table: for each motion, a block with weakest singular values and all methods."""
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 

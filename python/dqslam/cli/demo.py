@@ -1,4 +1,4 @@
-"""``dqslam demo``: a few simulated drives, solved; what a newcomer sees first."""
+"""``dqslam demo``: a few simulated drives, solved, as a first look for newcomers."""
 
 import time
 from dataclasses import replace
@@ -40,10 +40,10 @@ def demo(
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
-    """Simulate a few drives past objects, solve each from odometry and boxes alone, and draw them.
+    """Simulate a few drives past objects, solve each from odometry and boxes, and draw them.
 
-    Takes seconds. Writes a directory for each drive (trajectory.txt, map.json, ...), demo.json,
-    maps.png and config.toml.
+    It takes seconds, and writes a directory for each drive (trajectory.txt, map.json, ...),
+    demo.json, maps.png and config.toml.
     """
     from dqslam import io
     from dqslam.plot import plot_maps

@@ -56,8 +56,8 @@ def evaluate(
 ) -> None:
     """Compare the trajectory, the objects and the boxes of DIR with the truth.
 
-    Writes evaluation.json, and its options as evaluation.toml, into DIR. docs/evaluation.md says
-    what each number is.
+    Writes evaluation.json, and the options as evaluation.toml, into DIR. docs/evaluation.md
+    describes each number.
     """
     from dqslam import io
     from dqslam.evaluation import evaluate_results

@@ -1,4 +1,4 @@
-"""Files that a command finds by itself: results in a simulated recording, the truth beside them."""
+"""Files that a command finds by itself: results in a simulated recording, and their truth."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ GROUNDTRUTH, OBJECTS = "groundtruth.txt", "objects.csv"
 
 
 def results_in(directory: Path) -> Path:
-    """Return where the results are: of a simulated recording, in its folder of results."""
+    """Return the folder of the results; a simulated recording has it inside."""
     inside = directory / "results"
     simulated = (directory / "odometry.txt").exists() and (inside / "trajectory.txt").exists()
     return inside if simulated and not (directory / "trajectory.txt").exists() else directory
@@ -21,7 +21,7 @@ def results_in(directory: Path) -> Path:
 def truth_of(
     results: Path, groundtruth: Path | None, objects: Path | None
 ) -> tuple[Path | None, Path | None]:
-    """Return the true trajectory and objects: as given, else in the results or beside them."""
+    """Return the given true trajectory and objects, or else those in the results or beside them."""
     if groundtruth is not None:
         return groundtruth, objects
     folders = (results, results.resolve().parent)

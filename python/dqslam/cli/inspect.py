@@ -1,4 +1,4 @@
-"""``dqslam inspect``: what is in a recording, and which of the usual mistakes."""
+"""``dqslam inspect``: the content of a recording, and the usual mistakes in it."""
 
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -45,10 +45,10 @@ def inspect(
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
-    """Say what is in a recording, and warn of the usual mistakes.
+    """Show the content of a recording, and warn of the usual mistakes.
 
-    Poses the wrong way round, x y width height for corners, another image size, a lens whose
-    distortion is missing, clocks that do not meet: each by a check that compares two readings.
+    These are inverted poses, x y width height instead of corners, another image size, missing lens
+    distortion, and clocks that do not match. Each check compares two interpretations of the files.
     """
     from dqslam import io
     from dqslam.inspection import inspect_recording

@@ -13,20 +13,20 @@ OdometryFile = Annotated[Path, typer.Option(help="Trajectory: TUM, KITTI, EuRoC,
 DetectionFile = Annotated[Path, typer.Option(help="Boxes: CSV, COCO, YOLO, MOT, bag.")]
 Formats = Annotated[
     list[str] | None,
-    typer.Option("--format", metavar="NAME", help="Of a file, where its look does not tell."),
+    typer.Option("--format", metavar="NAME", help="Format of a file that is not recognized."),
 ]
 FrameTimesFile = Annotated[
     Path | None, typer.Option(help="Times of frames: KITTI times.txt, TUM rgb.txt, frames.csv.")
 ]
 FrameRate = Annotated[
-    float | None, typer.Option(metavar="HZ", help="Or frames per second, frame 0 at 0 s.")
+    float | None, typer.Option(metavar="HZ", help="Or frames per second, with frame 0 at 0 s.")
 ]
 MaxTimeDifference = Annotated[
     float | None,
     typer.Option(help="Seconds from a box to its pose. Default: half the interval of poses."),
 ]
 ResultDirectory = Annotated[
-    Path, typer.Option("--out", metavar="DIR", help="Directory of the results, made if need be.")
+    Path, typer.Option("--out", metavar="DIR", help="Directory of the results, created if needed.")
 ]
 FirstSeed = Annotated[
     int, typer.Option(min=0, help="Seed of the first trial; the next ones count up.")
@@ -38,19 +38,19 @@ BackendName = Annotated[
     Literal["serial", "processes", "loky", "dask", "ray"] | None,
     typer.Option(
         "--backend",
-        help="Where trials run: in this process; in others, by Python's own pool or joblib's loky; "
-        "on a cluster. Default: loky where joblib is installed, else processes.",
+        help="Where trials run: this process, other processes (Python's or joblib's loky), or a "
+        "cluster. Default: loky if joblib is installed, else processes.",
     ),
 ]
 Scheduler = Annotated[
     str | None,
     typer.Option(
         metavar="ADDRESS",
-        help="Of the cluster: tcp://host:8786 of dask, or of ray. Default: one on this machine.",
+        help="Cluster's address, for dask tcp://host:8786. Default: a cluster on this machine.",
     ),
 ]
 
-# Of commands that look at results, with the truth where there is any.
+# Options of commands that show results, with the truth if there is one.
 TruthFile = Annotated[
     Path | None,
     typer.Option(

@@ -1,6 +1,6 @@
-"""What a command says: tables and lines for people, one JSON document for machines, or nothing.
+"""The output of a command: tables and lines for people, one JSON document for machines, or nothing.
 
-All of it goes to stdout; what is shown while one waits goes to stderr, where that is a terminal.
+All of it goes to stdout. Progress goes to stderr, and only if that is a terminal.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ Json = Annotated[
 
 
 class Output:
-    """The one way of a command to say something.
+    """The output of a command.
 
     Parameters
     ----------
     quiet
-        Whether nothing is said, and no progress shown.
+        Whether nothing is printed, and no progress is shown.
     as_json
         Whether only `document` prints.
     """
@@ -52,14 +52,14 @@ class Output:
             Console().print(table)
 
     def line(self, text: str, *, style: str | None = None) -> None:
-        """Print a line as it is, never broken."""
+        """Print a line as it is, without wrapping."""
         if self._speaks:
             from rich.console import Console
 
             Console().print(text, style=style, markup=False, highlight=False, soft_wrap=True)
 
     def document(self, content: dict[str, Any]) -> None:
-        """Print the JSON document, if one is asked for; NaN and infinity become null."""
+        """Print the JSON document if JSON is wanted; NaN and infinity become null."""
         if self._as_json:
             from dqslam.io.files import jsonable
 
@@ -67,16 +67,16 @@ class Output:
             typer.echo(text)
 
     def file(self, path: Path) -> None:
-        """Print a JSON file that was written, if JSON is asked for; else say where it is."""
+        """Print a JSON file that was written if JSON is wanted, or else its path."""
         if self._as_json:
             typer.echo(path.read_text(encoding="utf-8"), nl=False)
         self.line(f"wrote {path}")
 
     @contextmanager
     def trials(self, total: int) -> Iterator[Callable[[int, int], None]]:
-        """Show a bar of the trials that are done, with the time left; gives what to tell them to.
+        """Show a bar of finished trials with the time left, and give the function that updates it.
 
-        That is a function of (trials done, trials).
+        It is called with (trials done, trials).
         """
         from rich.progress import BarColumn, MofNCompleteColumn, TimeRemainingColumn
 
@@ -86,9 +86,9 @@ class Output:
 
     @contextmanager
     def share(self, what: str) -> Iterator[Callable[[float], None]]:
-        """Show since when something goes on, and a bar with the time left once it is told a share.
+        """Show the elapsed time, and a bar with the time left after the first update.
 
-        That is the share of the work, 0 to 1, that is done.
+        It gives a function that is called with the share of the work, 0 to 1, that is done.
         """
         from rich.progress import (
             BarColumn,
@@ -112,14 +112,14 @@ class Output:
 
     @contextmanager
     def steps(self, what: str, total: int) -> Iterator[Callable[[], None]]:
-        """Show a bar of the steps that are done, with the time left; gives what ends a step."""
+        """Show a bar of finished steps with the time left, and give a function that ends a step."""
         with self.share(what) as update:
             ended = count(1)
             yield lambda: update(next(ended) / total)
 
     @contextmanager
     def live(self, what: str) -> Iterator[Callable[[str], None]]:
-        """Show a line that changes as often as one likes; gives what to tell its text to."""
+        """Show a line that can change, and give the function that sets its text."""
         from rich.console import Console
 
         console = Console(stderr=True)
@@ -131,7 +131,7 @@ class Output:
 
     @contextmanager
     def waiting(self, what: str) -> Iterator[None]:
-        """Show that something goes on of which nobody knows how long it takes, and since when."""
+        """Show that something of unknown duration is running, and its elapsed time."""
         from rich.progress import SpinnerColumn, TimeElapsedColumn
 
         with self._bar((SpinnerColumn(), what, TimeElapsedColumn()), None):

@@ -136,7 +136,7 @@ def paper(
 
 
 def _results(table: "PaperTable") -> "Table":
-    """Lay out our numbers, beside those that the paper printed where they are of its scenario."""
+    """Return the table of our numbers, with those of the paper if it has the same scenario."""
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
@@ -176,7 +176,7 @@ def _results(table: "PaperTable") -> "Table":
 
 
 def _scan(table: "PaperTable") -> "Table":
-    """Show what each weight of the paper's box residual gives."""
+    """Show the result of each weight of the paper's box residual."""
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
@@ -202,7 +202,7 @@ def _scan(table: "PaperTable") -> "Table":
 
 def _cells(values: "Statistics | tuple[float, float]") -> list[str]:
     numbers = values if isinstance(values, tuple) else (values.avg, values.med, values.max)
-    # Quadrics that are far off have volumes that no fixed notation can show.
+    # Quadrics that are far off have volumes too large for fixed notation.
     return [f"{number:.2f}" if not number >= 1e4 else f"{number:.0e}" for number in numbers]
 
 

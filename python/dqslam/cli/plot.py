@@ -24,7 +24,7 @@ from dqslam.cli.settings import ConfigFile, save_settings
 if TYPE_CHECKING:
     from dqslam.io import Results
 
-_STILLS = 9  # spread evenly, where no frames are asked for
+_STILLS = 9  # number of images, evenly spread, if no frames are given
 
 
 def plot(
@@ -85,8 +85,8 @@ def plot(
 ) -> None:
     """Draw the results in DIR: the map from above, errors over time, residuals, boxes.
 
-    Of a sweep, its errors against what was varied. Needs the extra "plot"; docs/plots.md says what
-    each figure shows. Writes its options, plot.toml, beside them.
+    For a sweep, it draws the errors against the varied settings. It needs the extra "plot";
+    docs/plots.md describes each figure. The options go into plot.toml beside the figures.
     """
     from dqslam import io
     from dqslam.plot import plot_results
@@ -171,7 +171,7 @@ def _overlay(
 
 
 def _choose(frames: str | None, images: dict[int, Path], *, is_film: bool) -> dict[int, Path]:
-    """Return the images that are asked for; without any asking all of a film, else a few."""
+    """Return the selected images; by default all for a film, else a few."""
     poses = sorted(images)
     if frames is None and (is_film or len(poses) <= _STILLS):
         return {pose: images[pose] for pose in poses}
@@ -191,7 +191,7 @@ def _choose(frames: str | None, images: dict[int, Path], *, is_film: bool) -> di
 
 
 def _span(part: str) -> range:
-    """Return the poses of "7", "7-20" or "7-20:5", ends included."""
+    """Return the poses of "7", "7-20" or "7-20:5", with both ends."""
     try:
         ends, _, step = part.partition(":")
         first, dash, last = ends.partition("-")

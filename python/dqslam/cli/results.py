@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class Table(Protocol):
-    """What a study comes to."""
+    """The table of a study."""
 
     def save(self, path: Path) -> None:
         """Write it as JSON."""
@@ -27,7 +27,7 @@ SomeTable = TypeVar("SomeTable", bound=Table)
 
 
 def draw_figure(output: Output, path: Path, draw: Callable[[Path], None]) -> None:
-    """Draw an image file, or say why there is none: figures are an extra."""
+    """Draw an image file, or print why there is none, because figures are an extra."""
     if find_spec("matplotlib") is None:
         output.line(f"no {path.name}: matplotlib is missing (pip install 'dqslam[plot]')")
         return

@@ -1,4 +1,4 @@
-"""What ``dqslam run`` shows: a report as tables and lines."""
+"""The output of ``dqslam run``: a report as tables and lines."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -9,7 +9,7 @@ if TYPE_CHECKING:
 
 
 def show_report(output: Output, report: dict[str, Any]) -> None:
-    """Show a report: an overview, its objects, and what is to be known of the result."""
+    """Show a report: an overview, its objects, and remarks on the result."""
     output.table(_overview(report))
     if report["objects"]:
         output.table(_objects(report["objects"]))

@@ -1,7 +1,7 @@
-"""Options from a file, and the options that were in force into one: ``--config`` and config.toml.
+"""Options from a file (``--config``), and the used options written to a file (config.toml).
 
-The keys are the names of the options, with underscores. An option on the command line wins over the
-file, the file over the default.
+The keys are the names of the options, with underscores. An option on the command line overrides the
+file, and the file overrides the default.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ if TYPE_CHECKING:
     from pydantic import BaseModel
 
 CONFIG = "config.toml"
-# They say what is shown, not what is done.
+# These options change only what is shown.
 _NOT_SETTINGS = ("help", "config", "quiet", "json")
 
 
 def _read(context: typer.Context, path: Path | None) -> Path | None:
-    """Let the settings of a file stand in for the defaults of the options."""
+    """Replace the defaults of options by the settings of a file."""
     if path is None or context.resilient_parsing:
         return path
     from dqslam.config import load_toml_model
@@ -69,7 +69,7 @@ def save_settings(context: typer.Context, path: Path) -> None:
 def settings_text(context: typer.Context) -> str:
     """Return all options as they are in force, as TOML for `--config`.
 
-    Without those that are unset: what they default to may depend on the machine or the files.
+    Unset options are left out, because their defaults may depend on the machine or the files.
     """
     from dqslam.config import toml_text
 
@@ -80,7 +80,7 @@ def settings_text(context: typer.Context) -> str:
 
 
 def setting_names(command: Any) -> dict[str, str]:
-    """Return the parameters of a command by the name that a file has for them."""
+    """Return the parameters of a command by their names in a file."""
     names = {}
     for parameter in command.params:
         long = [name for name in parameter.opts if name.startswith("--")]
@@ -99,7 +99,7 @@ def settings_model(command: Any) -> type[BaseModel]:
         key: _setting_type(annotations[name]) for key, name in setting_names(command).items()
     }
     keys |= {"command": Literal[command.name], "dqslam_version": str}
-    # By alias: a model must not have fields of any name.
+    # Fields have aliases, because not every name is allowed for a field of a model.
     fields: dict[str, Any] = {
         f"setting_{key}": (type_ | None, Field(None, alias=key)) for key, type_ in keys.items()
     }
@@ -108,7 +108,7 @@ def settings_model(command: Any) -> type[BaseModel]:
 
 
 def _setting_type(annotation: Any) -> Any:
-    """Turn the annotation of an option into the type that it has in a file, with its bounds."""
+    """Turn the annotation of an option into its type in a file, with its bounds."""
     from pydantic import Field
 
     if get_origin(annotation) is Annotated:

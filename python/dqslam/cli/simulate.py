@@ -1,4 +1,4 @@
-"""``dqslam simulate``: a simulated recording as files, and the truth beside it."""
+"""``dqslam simulate``: a simulated recording as files, with its truth."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -30,10 +30,10 @@ def simulate(
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
-    """Write a simulated recording, its truth, and how to estimate and evaluate it.
+    """Write a simulated recording, its truth, and the settings to estimate and evaluate it.
 
     Writes camera.json, odometry.txt, odometry_covariance.csv and boxes.csv; groundtruth.txt,
-    objects.csv and true_boxes.csv; run.toml and evaluate.toml for --config of these commands.
+    objects.csv and true_boxes.csv; and run.toml and evaluate.toml for --config of these commands.
     """
     from dqslam import io
     from dqslam.config import toml_text
@@ -63,7 +63,7 @@ def simulate(
 
 
 def _commands(out: Path) -> dict[str, dict[str, str]]:
-    """Return the options of the commands that estimate and evaluate what is in a directory."""
+    """Return the options of the commands that estimate and evaluate a recording in a directory."""
     results = str(out / "results")
     run = {
         "command": "run",

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from dqslam.studies.sweep import CellSummary, SweepSummary
 
-NAMED = 5  # failures of one kind that are named
+NAMED = 5  # number of failures of one kind that are named
 
 
 def sweep(
@@ -34,9 +34,9 @@ def sweep(
 ) -> None:
     """Vary settings of a scenario or the estimator, over a grid or at random, with many seeds.
 
-    Stopped or killed, the same command goes on where it was. Writes results.csv, a row for each
-    trial, results.parquet where pyarrow is installed, summary.json, sweep.toml, the
-    file, and config.toml.
+    If it is stopped or killed, the same command continues. Writes results.csv with a row for each
+    trial, results.parquet if pyarrow is installed, summary.json, sweep.toml (a copy of the file)
+    and config.toml.
     """
     from dqslam.studies.sweep import load_sweep, run_sweep
 
@@ -92,7 +92,7 @@ def _table(summary: "SweepSummary") -> "Table":
 
 
 def _short(names: tuple[str, ...]) -> dict[str, str]:
-    """Leave out of dotted names what is not needed to tell them apart."""
+    """Shorten dotted names as far as they remain different."""
     last = [name.rsplit(".", 1)[-1] for name in names]
     return {
         name: end if last.count(end) == 1 else name for name, end in zip(names, last, strict=True)
@@ -110,12 +110,12 @@ def _mean(cell: "CellSummary", metric: str) -> str:
 def _number(number: float, interval: tuple[float, float] | None = None) -> str:
     if interval is None:
         return f"{number:.3g}"
-    # A bare [ would be rich's markup; without a space in it, the interval is never broken.
+    # A bare [ would be rich's markup. The interval has no space, so it is never wrapped.
     return f"{number:.3g} \\[{interval[0]:.2g},{interval[1]:.2g}]"
 
 
 def _failures(failures: Mapping[str, str]) -> list[str]:
-    """Say each error once, with the trials that it ended."""
+    """Print each error once, with the trials that it ended."""
     trials: dict[str, list[str]] = {}
     for trial, error in failures.items():
         trials.setdefault(error, []).append(trial)

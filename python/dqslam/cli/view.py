@@ -1,4 +1,4 @@
-"""``dqslam view``: look at a map, on a live page, a static page, in Rerun or MeshLab."""
+"""``dqslam view``: show a map on a live page, a static page, in Rerun or MeshLab."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def view(
 ) -> None:
     """Show the map of DIR on a page: trajectory, cameras, objects, boxes, truth; Ctrl-C stops.
 
-    Needs the extra `view`; --export and --ply do without, --rerun needs the extra `rerun`.
+    It needs the extra `view`, and --rerun needs the extra `rerun`; --export and --ply need none.
     """
     from dqslam import io
     from dqslam._colors import ESTIMATE
@@ -88,5 +88,5 @@ def _serve(scene: Scene, host: str, port: int, output: Output) -> None:
             output.line(f"{address} shows {scene.title}; Ctrl-C stops")
             while True:
                 sleep(3600.0)
-    except KeyboardInterrupt:  # the usual way to end
+    except KeyboardInterrupt:  # the usual end
         output.line("stopped")

@@ -1,4 +1,4 @@
-"""Settings in TOML files: read into models with every mistake named, and written."""
+"""Settings in TOML files: they are read into models, with every mistake named, and written."""
 
 from dqslam.config.lines import key_lines as key_lines
 from dqslam.config.model import TomlFile as TomlFile

@@ -1,4 +1,4 @@
-"""On which line of a TOML file each key stands, which the standard library does not say."""
+"""The line of each key in a TOML file, which the standard library does not report."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import tomllib
 from collections.abc import Iterator
 
 Location = tuple[str | int, ...]
-"""Keys, and positions in arrays, from the top of the file."""
+"""The keys, and positions in arrays, from the top of the file to a setting."""
 
 _TOKEN = re.compile(
     r'"""(?:\\.|[^\\])*?"{3,5}'
@@ -25,7 +25,7 @@ _END = ""
 def key_lines(text: str) -> dict[Location, int]:
     """Return the line, from 1, on which each key and each entry of an array first occurs.
 
-    Of a text that is known to be TOML: there is no other check.
+    The text must be valid TOML, because it is not checked here.
     """
     scanner = _Scanner(text)
     scanner.read()
@@ -36,7 +36,7 @@ class _Scanner:
     def __init__(self, text: str) -> None:
         self.lines: dict[Location, int] = {}
         self._tokens = _tokens(text)
-        self._entries: dict[Location, int] = {}  # of arrays of tables, so far
+        self._entries: dict[Location, int] = {}  # number of entries of each array of tables so far
         self._token, self._line = _END, 0
         self._next()
 
@@ -57,7 +57,7 @@ class _Scanner:
         self.lines.setdefault(location, self._line)
 
     def _header(self) -> Location:
-        """Read [a.b] or [[a.b]]; entries of an array of tables count up."""
+        """Read [a.b] or [[a.b]], which starts the next entry of an array of tables."""
         self._next()
         is_array = self._token == "["
         if is_array:

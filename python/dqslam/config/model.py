@@ -1,4 +1,4 @@
-"""Settings from a TOML file into a pydantic model: all mistakes at once, each with its line."""
+"""Settings from a TOML file to a pydantic model, with all mistakes at once, each with its line."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from dqslam._files import FileError, FileErrors, read_text
 from dqslam.config.lines import Location, key_lines
 
 Model = TypeVar("Model", bound=BaseModel)
-MOST_LISTED = 12  # known keys in a message
+MOST_LISTED = 12  # largest number of known keys in a message
 
 
 @dataclass(frozen=True)
 class TomlFile:
-    """The content of a TOML file, and where it stands."""
+    """The content of a TOML file, and the lines of its keys."""
 
     path: Path
     text: str
@@ -34,7 +34,7 @@ class TomlFile:
         return key_lines(self.text)
 
     def error(self, location: Location, message: str) -> FileError:
-        """Blame the key at a location, or the innermost section round it that the file has."""
+        """Return an error at the line of a key, or else of the innermost section around it."""
         for length in range(len(location), 0, -1):
             if location[:length] in self.lines:
                 return FileError(self.path, message, self.lines[location[:length]])
@@ -66,15 +66,15 @@ def load_toml_model(path: str | Path, model: type[Model]) -> Model:
     Raises
     ------
     FileError
-        When the file is missing, empty, or not TOML; or with all that the model refuses, a line
-        each (`FileErrors`), with a suggestion for a misspelt key.
+        If the file is missing, empty or not TOML. `FileErrors` lists everything that the model
+        refuses, one line for each, with a suggestion for a misspelled key.
     """
     file = read_toml(path)
     return check_model(model, file.content, file)
 
 
 def check_model(model: type[Model], content: Mapping[str, Any], file: TomlFile) -> Model:
-    """Make a model of what a file says, or of what it says together with another."""
+    """Make a model of the content of a file, or of its content combined with that of another."""
     try:
         return model.model_validate(dict(content))
     except ValidationError as error:
@@ -83,7 +83,7 @@ def check_model(model: type[Model], content: Mapping[str, Any], file: TomlFile) 
 
 
 def right_keys(model: type[BaseModel], content: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what a model accepts of a file's content, whole keys of its top."""
+    """Return the top-level keys of a file's content that a model accepts."""
     try:
         model.model_validate(dict(content))
     except ValidationError as error:
@@ -95,7 +95,7 @@ def right_keys(model: type[BaseModel], content: Mapping[str, Any]) -> dict[str, 
 def unknown_keys(
     model: type[BaseModel], content: Mapping[str, Any], file: TomlFile
 ) -> list[FileError]:
-    """Return what `check_model` says of the keys alone, whatever their values."""
+    """Return the errors of `check_model` about unknown keys, and ignore values."""
     try:
         model.model_validate(dict(content))
     except ValidationError as error:
@@ -122,7 +122,7 @@ def _mistake(
 
 
 def _in_file(content: Any, location: Location, *, missing: bool) -> Location:
-    """Leave out of pydantic's location what is not of the file: names of kinds and of types."""
+    """Remove names of kinds and types, which are not in the file, from pydantic's location."""
     found: list[str | int] = []
     for step in location[:-1] if missing else location:
         is_there = step in content if isinstance(content, Mapping) else _is_entry(content, step)
@@ -137,7 +137,7 @@ def _is_entry(content: Any, step: str | int) -> bool:
 
 
 def _suggestion(model: type[BaseModel], location: Location) -> str:
-    """Say what an unknown key may be a misspelling of, or else which keys there are."""
+    """Suggest a known key that resembles an unknown one, or else list the known keys."""
     known = _fields(model, location[:-1])
     close = get_close_matches(str(location[-1]), known, n=1)
     if close:
@@ -148,12 +148,12 @@ def _suggestion(model: type[BaseModel], location: Location) -> str:
 
 
 def _fields(model: type[BaseModel], location: Location) -> list[str]:
-    """Return the names of the settings that may be at a location, of any kind that fits."""
+    """Return the names of the settings that may be at a location, for all kinds that fit."""
     models = [model]
     for step in location:
         inside = [_field(one, step) for one in models]
         below = [found for one in inside if one is not None for found in _models(one)]
-        # Else it is no key but the kind that tells apart what may be there.
+        # Otherwise it is not a key, but the kind of a union's member.
         models = below or [one for one in models if step in _kinds(one)] or models
     names = (field.alias or name for one in models for name, field in one.model_fields.items())
     return list(dict.fromkeys(names))
@@ -167,7 +167,7 @@ def _field(model: type[BaseModel], step: str | int) -> Any:
 
 
 def _models(annotation: Any) -> Iterator[type[BaseModel]]:
-    """Yield the models in an annotation, those in unions and containers too."""
+    """Yield the models in an annotation, including those in unions and containers."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         yield annotation
     for inner in get_args(annotation):

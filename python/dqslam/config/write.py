@@ -1,4 +1,4 @@
-"""Settings into the text of a TOML file."""
+"""The text of a TOML file for some settings."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from typing import Any
 
 
 def toml_text(settings: Mapping[str, Any]) -> str:
-    """Write settings, a line each, without those that are None, which TOML has no word for.
+    """Return settings as TOML, one line for each, without those that are None, which TOML lacks.
 
-    Texts, numbers, truth values and lists of them, by names that need no quotes.
+    Values are texts, numbers, booleans and lists of these; names must not need quotes.
     """
     lines = (f"{name} = {_value(value)}\n" for name, value in settings.items() if value is not None)
     return "".join(lines)
@@ -22,7 +22,7 @@ def _value(value: Any) -> str:
     if isinstance(value, int | float):
         return repr(value)
     if isinstance(value, str):
-        # JSON's escapes are TOML's; only DEL may stand as it is in JSON alone.
+        # JSON's escapes are valid in TOML, but DEL must be escaped in TOML and not in JSON.
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, list | tuple):
         return f"[{', '.join(map(_value, value))}]"

@@ -1,4 +1,4 @@
-"""Boxes of an estimate: against its own objects, and against true boxes."""
+"""Boxes of an estimate, compared with its own objects and with true boxes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ from dqslam.metrics import match_boxes, reprojection_iou, score_association
 def judge_reprojection(results: Results) -> dict[str, Any] | None:
     """Compare the boxes of mapped objects with the projections of these.
 
-    All that were used, those of them that fit, and those that were held out; None without boxes.
+    There are results for all boxes that were used, for those of them that fit, and for those that
+    were held out; None without boxes.
     """
     boxes = results.boxes
     if boxes is None:
@@ -31,7 +32,7 @@ def judge_reprojection(results: Results) -> dict[str, Any] | None:
 
 
 def box_overlaps(results: Results, boxes: BoxTable) -> Floats:
-    """Return the IoU of each box with its projected object, (m,); NaN where that is not mapped."""
+    """Return the IoU (m,) of each box with its projected object; NaN if it is not mapped."""
     objects = results.objects
     row_of = {int(number): row for row, number in enumerate(objects.object_ids)}
     row = np.array([row_of.get(int(number), -1) for number in boxes.object_id], dtype=np.int64)
@@ -63,17 +64,18 @@ def judge_association(
     min_iou: float = 0.5,
     max_time_difference: float | None = None,
 ) -> dict[str, Any]:
-    """Judge which object each box was taken for by the true box it overlaps.
+    """Compare the object of each box with that of the true box which it overlaps.
 
-    Only boxes from poses for which the truth has a box: elsewhere nobody may have looked. Nor are
-    those judged that overlap a true box without an id, or that were held out.
+    Only boxes from poses with a true box are compared, because other images may be unlabeled. Boxes
+    that overlap a true box without an id, or that were held out, are not compared either.
 
     Parameters
     ----------
     min_iou
-        A box that overlaps a true one by less shows nothing.
+        A box whose IoU with every true box is less than this shows no object.
     max_time_difference
-        Seconds from a true box to its pose, by default half the median interval of poses.
+        The largest time from a true box to its pose in seconds; by default half the median
+        interval of poses.
     """
     boxes = results.boxes
     if boxes is None:

@@ -1,4 +1,4 @@
-"""Errors of each pose against the truth, with the uncertainty that the estimate claims."""
+"""Errors of each pose against the truth, with the uncertainty of the estimate."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ class PoseErrors:
     timestamps: Floats
     """Seconds, shape (k,)."""
     distance: Floats
-    """Absolute trajectory error: distance after alignment as ``dqslam evaluate`` does, (k,) m."""
+    """Absolute trajectory error: distance after the alignment of ``dqslam evaluate``, (k,) m."""
     odometry_distance: Floats
-    """The same of the odometry, aligned by itself, shape (k,)."""
+    """Absolute trajectory error of the odometry, which is aligned by itself, (k,) m."""
     position: Floats
-    """Estimate - truth [m], the first pose being made equal, shape (k, 3)."""
+    """Estimate - truth [m] with equal first poses, shape (k, 3)."""
     position_sigma: Floats
-    """Standard deviation that the estimate claims [m], shape (k, 3); NaN where unknown."""
+    """Standard deviation of the position by the estimate [m], shape (k, 3); NaN where unknown."""
     rotation: Floats
-    """Rotation vector from truth to estimate [rad], likewise, shape (k, 3)."""
+    """Rotation vector from truth to estimate [rad] with equal first poses, shape (k, 3)."""
     rotation_sigma: Floats
-    """Its standard deviation [rad], shape (k, 3)."""
+    """Standard deviation of the rotation by the estimate [rad], shape (k, 3)."""
 
 
 def pose_errors(

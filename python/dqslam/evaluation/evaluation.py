@@ -1,4 +1,4 @@
-"""Put all judgments of a directory of results together."""
+"""The complete evaluation of a directory of results."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from dqslam.evaluation.trajectory import common_poses, judge_trajectory
 from dqslam.io import Results, Trajectory, TrueBoxes, TrueObjects
 from dqslam.metrics import Align, Alignment, align_poses, align_positions
 
-# Where orientations differ by more, radians, they are not of the same thing.
+# Orientations that differ by more than this, radians, belong to different things.
 LARGEST_TURN = np.radians(20.0)
 
 
@@ -30,7 +30,7 @@ def evaluate_results(
     boxes: TrueBoxes | None = None,
     max_time_difference: float | None = None,
 ) -> dict[str, Any]:
-    """Return what ``evaluation.json`` holds: docs/evaluation.md has every key and unit.
+    """Return the content of ``evaluation.json``; docs/evaluation.md has every key and unit.
 
     Parameters
     ----------
@@ -41,13 +41,14 @@ def evaluate_results(
         positions, each by its own motion; objects by the whole poses of the estimate, see
         ``object_alignment``.
     rpe_delta, rpe_unit
-        Over what the relative pose error is taken, see ``relative_pose_error``.
+        The distance for the relative pose error, see ``relative_pose_error``.
     objects, match, gate
         The true objects and how to match them, see ``judge_objects``.
     boxes
-        Boxes of known objects: the association is judged by them.
+        Boxes of known objects, to evaluate the association.
     max_time_difference
-        Seconds between times that count as the same, by default half the interval of poses.
+        Times that differ by at most this, in seconds, count as the same; by default half the
+        interval of poses.
     """
     from scipy.spatial.transform import Rotation
 
@@ -89,12 +90,12 @@ def evaluate_results(
 def object_alignment(
     results: Results, poses: Floats, true_poses: Floats, align: Align
 ) -> tuple[Alignment, Literal["poses", "positions"]]:
-    """Return the motion that brings the map into the world of the truth, and what it is found by.
+    """Return the motion that brings the map into the world of the truth, and its source.
 
-    It fits whole poses, (n, 7), with points as far ahead of them as objects are: the median of the
-    objects' least distances from the path. Positions alone leave the turn about a straight path
-    free. They have to do where the poses do not agree, as with the pose of a body that looks
-    elsewhere than the camera.
+    It fits whole poses, (n, 7), with points as far ahead of them as objects are, which is the
+    median of the objects' least distances from the path. Positions alone do not determine the
+    rotation about a straight path. They are used if the poses do not agree, for example because the
+    true poses are those of a body that looks in another direction than the camera.
     """
     from scipy.spatial.transform import Rotation
 

@@ -1,4 +1,4 @@
-"""How each box fits the map: what figures of residuals and of images show."""
+"""How well each box fits the map, for figures of residuals and of images."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from dqslam.io import BoxTable, FileError, Results
 
 @dataclass(frozen=True, eq=False)
 class BoxFits:
-    """The boxes of ``boxes.csv`` beside the projections of their objects, row by row."""
+    """The boxes of ``boxes.csv`` with the projections of their objects, row by row."""
 
     boxes: BoxTable
     object_row: Ints
-    """Of the object in the map, -1 for none; shape (m,)."""
+    """Row of the object in the map, -1 for none; shape (m,)."""
     predicted: Floats
     """Box of the projection, undistorted pixels, shape (m, 4); NaN where there is none."""
     residual: Floats
-    """(predicted - detected) / sigma of each edge, shape (m, 4); NaN where there is none, and for
-    edges that are the border of the image."""
+    """(predicted - detected) / sigma of each edge, shape (m, 4); NaN where there is no projection,
+    and for edges that are the border of the image."""
     overlap: Floats
-    """IoU of both, shape (m,); 0 where the object is not in front, NaN where none is mapped."""
+    """IoU of box and projection, shape (m,); 0 if the object is not in front, NaN if not mapped."""
     noise: BoxNoise
-    """What sigma is taken from."""
+    """The noise that sigma is computed from."""
 
     @property
     def is_whole(self) -> Bools:
@@ -41,9 +41,9 @@ class BoxFits:
         return np.asarray(np.sum(self.residual**2, axis=1))
 
     def frames(self, least_boxes: int = 1) -> tuple[Ints, Floats]:
-        """Return the poses that see mapped objects, by mean overlap ascending, and that; (f,).
+        """Return the poses with boxes of mapped objects, by ascending mean overlap, and it; (f,).
 
-        Only those with ``least_boxes`` of such boxes.
+        A pose needs at least ``least_boxes`` such boxes.
         """
         known = np.isfinite(self.overlap)
         pose, row = np.unique(self.boxes.pose[known], return_inverse=True)
@@ -55,12 +55,12 @@ class BoxFits:
 
 
 def fit_boxes(results: Results) -> BoxFits:
-    """Compare each box with its object; sigmas are those of the run's report, else the default.
+    """Compare each box with its object; sigmas come from the run's report, or else are the default.
 
     Raises
     ------
     ValueError
-        Without ``boxes.csv``.
+        If there is no ``boxes.csv``.
     """
     boxes, objects = results.boxes, results.objects
     if boxes is None:

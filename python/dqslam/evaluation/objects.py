@@ -20,7 +20,7 @@ from dqslam.metrics import (
 )
 
 Match = Literal["nearest", "id"]
-# How far off a match may be where sizes are unknown, meters.
+# The largest distance of a match if sizes are unknown, meters.
 GATE_WITHOUT_SIZES = 1.0
 
 
@@ -32,21 +32,21 @@ def judge_objects(
     match: Match = "nearest",
     gate: float | None = None,
 ) -> dict[str, Any]:
-    """Match the objects of a map with the true ones, and compare what both say of each.
+    """Match the objects of a map with the true ones, and compare each pair.
 
-    An object of the truth is taken for the ellipsoid that is inscribed in its box: semi-axes are
-    half its sizes. What the truth does not know, or no pair has, is None.
+    A true object stands for the ellipsoid that is inscribed in its box, with semi-axes of half its
+    sizes. Values that the truth does not have, or that no pair has, are None.
 
     Parameters
     ----------
     alignment
         true_from_estimated.
     match
-        "nearest" within the gate and of the same class, where the truth and the map have a class in
-        common; "id" of the same id.
+        "nearest" matches within the gate, and within a class if truth and map have a class in
+        common; "id" matches equal ids.
     gate
-        How far from a true object a match may be, meters; by default its longest side, or
-        ``GATE_WITHOUT_SIZES``.
+        The largest distance of a match from a true object, meters; by default its longest side,
+        or ``GATE_WITHOUT_SIZES``.
     """
     centers = alignment.apply(objects.centers)
     class_names = _comparable_classes(objects, truth)
@@ -85,7 +85,7 @@ def judge_objects(
 
 
 def _comparable_classes(objects: MapObjects, truth: TrueObjects) -> tuple[str, ...] | None:
-    """Return the classes of the truth, None when no object of the map could have any of them."""
+    """Return the classes of the truth, or None if no object of the map can have any of them."""
     if truth.class_name is None:
         return None
     have, true = (
@@ -128,7 +128,7 @@ def _match(
 def _compare_shapes(
     objects: MapObjects, row: int, truth: TrueObjects, true_row: int, alignment: Alignment
 ) -> dict[str, float | None]:
-    """Compare one object's size, orientation and space with the truth's, as far as known."""
+    """Compare size, orientation and overlap of one object with the truth, as far as known."""
     from scipy.spatial.transform import Rotation
 
     names = ("size_relative", "volume_ratio", "orientation_deg", "iou_3d")

@@ -1,4 +1,4 @@
-"""A trajectory against the true one, at the times that both have."""
+"""A trajectory compared with the true one, at the times that both have."""
 
 from __future__ import annotations
 
@@ -27,12 +27,13 @@ def common_poses(
 ) -> tuple[Ints, Ints]:
     """Return the rows of the poses that have a true one near in time, and those of the true ones.
 
-    Near is within ``max_time_difference`` s, by default half the smaller median interval of both.
+    Near means within ``max_time_difference`` s, by default half the smaller median interval of
+    the two.
 
     Raises
     ------
     ValueError
-        When there are fewer than three.
+        If there are fewer than three.
     """
     tolerance = max_time_difference
     if tolerance is None:
@@ -61,7 +62,7 @@ def judge_trajectory(
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """Return the absolute and the relative errors of poses, both (n, 7), row by row.
 
-    The relative ones are after the alignment too, which matters for its scale only.
+    The relative errors are also taken after the alignment, of which only the scale has an effect.
     """
     alignment = align_positions(poses[:, :3], true_poses[:, :3], align)
     absolute = absolute_trajectory_error(poses[:, :3], true_poses[:, :3], align=align)

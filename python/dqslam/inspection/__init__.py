@@ -1,4 +1,4 @@
-"""What is in a recording, and which of the usual mistakes are in it."""
+"""The content of a recording, and the usual mistakes that are in it."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ from dqslam.inspection.tracks import Ids as Ids
 from dqslam.io import DetectionTable, Trajectory
 
 Check = Callable[[Evidence], Finding | None]
-# In an order in which no check takes the mistake of a former one for its own, each with those whose
-# findings keep it from telling.
+# The order matters: no check may take the mistake of an earlier one for its own. Each check has the
+# names of the checks whose findings make it inconclusive.
 CHECKS: dict[str, tuple[Check, tuple[str, ...]]] = {
     "times": (check_times, ()),
     "box corners": (check_box_corners, ()),
@@ -36,11 +36,11 @@ CHECKS: dict[str, tuple[Check, tuple[str, ...]]] = {
 
 @dataclass(frozen=True)
 class Inspection:
-    """What is in a recording, and what was found in it."""
+    """The content of a recording, and the mistakes that were found in it."""
 
     summary: dict[str, Any]  #: ready for JSON
     findings: tuple[Finding, ...]
-    unchecked: dict[str, str]  #: why a check could not tell, by its name
+    unchecked: dict[str, str]  #: the reason why a check was inconclusive, by its name
 
 
 def inspect_recording(
@@ -51,18 +51,19 @@ def inspect_recording(
     ids: Ids | None = None,
     max_time_difference: float | None = None,
 ) -> Inspection:
-    """Look through a recording.
+    """Summarize a recording and check it for the usual mistakes.
 
     Parameters
     ----------
     camera, trajectory
-        As they were read.
+        Camera and trajectory as they were read.
     table
-        Boxes, unchecked and uncut: ``read_detections(path, cut=False, check=False)``.
+        Unchecked and uncut boxes, from ``read_detections(path, cut=False, check=False)``.
     ids
-        The column that tells objects apart; without, boxes are joined by their overlap.
+        The column of object ids; without it, boxes are joined by their overlap.
     max_time_difference
-        Seconds from a box to its pose; by default half the median interval of poses.
+        The largest time from a box to its pose in seconds; by default half the median interval
+        of poses.
     """
     evidence = Evidence.of(camera, trajectory, table, ids, max_time_difference)
     findings: dict[str, Finding] = {}

@@ -1,8 +1,8 @@
-"""The usual mistakes, each found by comparing two readings of the same files.
+"""The usual mistakes. Each is found by comparing two interpretations of the same files.
 
-Each check takes the Evidence and returns a Finding, or None where all is well, or raises
-CannotTellError. A reading is only doubted where another one explains the boxes far better. The
-shares were set by recordings of four kinds, right and with each mistake planted.
+Each check takes the Evidence. It returns a Finding, or None if all is well, or raises
+CannotTellError. A finding needs another interpretation that explains the boxes far better. The
+thresholds were chosen on recordings of four kinds, without mistakes and with each mistake planted.
 """
 
 from __future__ import annotations
@@ -21,24 +21,27 @@ from dqslam.io.detections.table import checked
 
 Floats = NDArray[np.float64]
 
-# What share of the median residual another reading must leave. Corners: right files have 10 times
-# as much with the other. Poses: with drift of 15 px a step it came down to once or twice as much.
+# The share of the median residual that the other interpretation must fall below. Corners: for right
+# files the other one leaves 10 times as much. Poses: with a drift of 15 px per step, it leaves only
+# once to twice as much.
 CORNERS_SHARE, DIRECTION_SHARE = 0.5, 0.7
-# A share of impossible boxes that is no slip, and what the right reading may leave of them.
+# The share of impossible boxes that makes a mistake, and the part of it that may remain.
 IMPOSSIBLE_SHARE, LEFT_SHARE = 0.05, 0.03
-# How far trackers predict boxes beyond the image [share of the image].
+# The distance by which trackers predict boxes beyond the image [share of the image].
 BEYOND = 0.02
-# How far from its middle a principal point may be [share of the image].
+# The largest distance of a principal point from the middle of the image [share of the image].
 OFF_MIDDLE = 0.15
-# Boxes that end together but begin apart: a count, a share of all; within a share of the image.
+# Boxes that end together but begin at different places: the least number of beginnings, the least
+# share of all boxes, and the end below which they are not at the border [share of the image].
 FEWEST_PILED, PILED_SHARE, WITHIN = 5, 0.01, 0.9
 ALIKE_PX = 5.0
-# What a lens must explain before it is believed, in how many tracks: right cameras were found to
-# leave 0.90 of the median residual under the best of the wrong lenses, a wrong one 0.77.
+# The share of the median residual that another lens may leave, and the least number of tracks. For
+# right cameras, the best of the wrong lenses left 0.90; for a wrong camera it left 0.77.
 LENS_SHARE, LENS_TRACKS = 0.85, 5
-# No lens at all is one reading, not the best of many: 1.09 where the lens is right, 0.86 where not.
+# No lens is a single alternative, not the best of many: it left 1.09 of the median residual for a
+# right lens, 0.86 for a wrong one.
 BARE_SHARE = 0.92
-# Where rays miss each other by more, it is for other reasons [px].
+# If rays miss each other by more than this, there is another reason [px].
 LARGEST_LENS_PX = 20.0
 RADIAL = tuple(
     itertools.product(
@@ -70,10 +73,10 @@ def check_pose_direction(evidence: Evidence) -> Finding | None:
 
 
 def check_box_corners(evidence: Evidence) -> Finding | None:
-    """Compare corners as given with x, y, width, height taken for corners, and the other way.
+    """Check whether corners are x, y, width and height instead, or the reverse.
 
-    First by boxes that are impossible, inverted or far outside of the image; where a reading makes
-    none impossible, by how well rays meet.
+    The first test counts impossible boxes, which are inverted or far outside of the image. If no
+    interpretation makes any impossible, the second test compares how well rays meet.
     """
     box = evidence.table.box
     position, size = box[:, :2], box[:, 2:]
@@ -98,10 +101,10 @@ def check_box_corners(evidence: Evidence) -> Finding | None:
 
 
 def check_image_size(evidence: Evidence) -> Finding | None:
-    """Compare the image with where boxes end, and its middle with the principal point.
+    """Compare the image with the places where boxes end, and its middle with the principal point.
 
-    Boxes of a larger image leave this one; boxes of a smaller one pile up at a border that is not
-    this one's; the principal point of another size is off the middle.
+    Boxes of a larger image leave this one. Boxes of a smaller image pile up at its border, within
+    this one. The principal point for another size is far from the middle.
     """
     camera, box = evidence.camera, evidence.table.box
     size = np.array([camera.width, camera.height])
@@ -127,8 +130,8 @@ def check_image_size(evidence: Evidence) -> Finding | None:
 def check_distortion(evidence: Evidence) -> Finding | None:
     """Compare the lens as given with none, and with a grid of others, by how well rays meet.
 
-    The best of the grid is chosen by a robust sum over the tracks, then judged by the median
-    residual.
+    The best of the grid has the smallest robust sum over the tracks. It is then compared by its
+    median residual.
     """
     camera = evidence.camera
     views = evidence.views(evidence.tracks())
@@ -170,7 +173,7 @@ def _best_lens(
         try:
             other = residuals(_with_lens(camera, k1, k2), views)
         except ValueError:
-            continue  # no inverse at one of the boxes
+            continue  # the lens has no inverse at one of the boxes
         both = ~(np.isnan(base) | np.isnan(other))
         if np.sum(both.any(axis=1)) < LENS_TRACKS:
             continue
@@ -183,7 +186,7 @@ def _best_lens(
 
 
 def check_boxes(evidence: Evidence) -> Finding | None:
-    """Ask the reader whether it takes all boxes, scores and times, as `dqslam run` does."""
+    """Check whether the reader accepts all boxes, scores and times, as in `dqslam run`."""
     camera = evidence.camera
     try:
         checked(evidence.table, width=camera.width, height=camera.height, cut=True)
@@ -193,12 +196,13 @@ def check_boxes(evidence: Evidence) -> Finding | None:
 
 
 def _border_within(evidence: Evidence) -> str | None:
-    """Say where boxes pile up well within the image; None where they do not."""
+    """Return where boxes pile up well within the image, or None if they do not."""
     camera, box = evidence.camera, evidence.table.box
     for axis, size in enumerate((camera.width, camera.height)):
         end = float(box[:, 2 + axis].max())
         at_end = box[box[:, 2 + axis] > end - 1]
-        # What stands still ends where it ends: boxes at a border begin at different places.
+        # Boxes of an object that stands still end together as well, but boxes at a border begin at
+        # different places.
         starts = len(np.unique(np.round(at_end[:, axis] / ALIKE_PX)))
         piled = starts >= FEWEST_PILED and len(at_end) >= PILED_SHARE * len(box)
         if piled and end < WITHIN * size:

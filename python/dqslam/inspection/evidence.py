@@ -1,4 +1,4 @@
-"""What the checks compare: how well rays meet under one reading of the files and under another."""
+"""The evidence for the checks: how well rays meet under different interpretations of the files."""
 
 from __future__ import annotations
 
@@ -17,26 +17,26 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Finding:
-    """A mistake that a check found, by its name, and what it saw."""
+    """A mistake that a check found: the name of the check, and a description."""
 
     check: str
     message: str
 
 
 class CannotTellError(Exception):
-    """A check has too little to go by."""
+    """A check has too little data for a conclusion."""
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """A recording as read: boxes unchecked and uncut, and which of them are of one object."""
+    """A recording as read, with unchecked and uncut boxes, and the tracks of its objects."""
 
     camera: _core.Camera
     trajectory: Trajectory
     table: DetectionTable
     pose: NDArray[np.int64]  #: (m,) row of the pose nearest in time to each box
-    timely: NDArray[np.bool_]  #: (m,) whether that is near enough
-    tolerance: float  #: what is near enough [s]
+    timely: NDArray[np.bool_]  #: (m,) whether that pose is within the tolerance
+    tolerance: float  #: the largest time from a box to its pose [s]
     ids: Ids | None
 
     @classmethod
@@ -48,7 +48,7 @@ class Evidence:
         ids: Ids | None,
         max_time_difference: float | None,
     ) -> Evidence:
-        """Join boxes to poses, within half the median interval of poses unless told otherwise."""
+        """Join boxes to poses, by default within half the median interval of poses."""
         times = trajectory.timestamps
         if len(times) < 2:
             raise ValueError("one pose only: nothing moves")
@@ -59,7 +59,7 @@ class Evidence:
         return cls(camera, trajectory, table, pose, late <= tolerance, tolerance, ids)
 
     def tracks(self, boxes: Floats | None = None) -> list[NDArray[np.int64]]:
-        """Return rows of tracks that have poses, of the boxes as given or as read otherwise."""
+        """Return the rows of tracks with poses, for the given boxes or other corners of them."""
         table = self.table if boxes is None else replace(self.table, box=boxes)
         timely = (group[self.timely[group]] for group in find_tracks(table, self.ids))
         tracks = [group for group in timely if len(group) >= FEWEST_VIEWS]
@@ -68,7 +68,7 @@ class Evidence:
         return tracks
 
     def views(self, tracks: list[NDArray[np.int64]], boxes: Floats | None = None) -> Views:
-        """Return poses and middles of boxes of each track."""
+        """Return the poses and the middles of the boxes of each track."""
         boxes = self.table.box if boxes is None else boxes
         middle = (boxes[:, :2] + boxes[:, 2:]) / 2
         longest = max(map(len, tracks))
@@ -79,7 +79,7 @@ class Evidence:
 
 
 def median_residual(camera: _core.Camera, views: Views) -> float:
-    """Return the median of how far middles are from the point of their track [px]."""
+    """Return the median distance of middles from the projected point of their track [px]."""
     off = residuals(camera, views)
     if np.isnan(off).all():
         raise CannotTellError("no object is seen from directions that differ enough")

@@ -1,7 +1,7 @@
 """Whether the rays through the middles of an object's boxes meet in a point.
 
-They do, but for the size of the object and the noise of its boxes, where poses, camera and boxes
-fit together: the median distance of the middles from the projection of the best point is then some
+They meet if poses, camera and boxes fit together, except for the size of the object and the noise
+of its boxes. The median distance of the middles from the projection of the best point is then a few
 pixels.
 """
 
@@ -15,21 +15,21 @@ from numpy.typing import NDArray
 from dqslam import _core
 
 ITERATIONS = 5
-# Middles further off than this lose their weight: false boxes, objects that moved [px].
+# Middles that are farther off than this lose their weight, as false boxes and moved objects [px].
 DOUBT_PX = 10.0
-# Root mean square angle that the rays of a track must span across, for a point to be told [rad].
+# The root mean square angle between rays of a track that a point needs to be determined [rad].
 LEAST_PARALLAX = 0.02
 NEAREST_M = 1e-6
-BEHIND_PX = 1e4  #: what a point behind the camera is off
+BEHIND_PX = 1e4  #: the residual of a point behind the camera
 
 
 @dataclass(frozen=True)
 class Views:
-    """Where the boxes of t tracks were seen from, at most n times each."""
+    """The poses and the middles of the boxes of t tracks, at most n for each."""
 
     world_from_camera: NDArray[np.float64]  #: (t, n, 7)
     middle: NDArray[np.float64]  #: (t, n, 2) px, as recorded
-    there: NDArray[np.bool_]  #: (t, n); the rest of a shorter track repeats its last view
+    there: NDArray[np.bool_]  #: (t, n) whether it is a view; a shorter track repeats its last one
 
 
 def inverted(poses: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -38,9 +38,9 @@ def inverted(poses: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def residuals(camera: _core.Camera, views: Views) -> NDArray[np.float64]:
-    """Return how far each middle is from the point of its track [px], shape (t, n).
+    """Return the distance of each middle from the point of its track [px], shape (t, n).
 
-    It is nan where a track is shorter, or its rays have no parallax.
+    It is NaN where a track is shorter, or where its rays have no parallax.
     """
     from scipy.spatial.transform import Rotation
 
@@ -57,13 +57,13 @@ def residuals(camera: _core.Camera, views: Views) -> NDArray[np.float64]:
     mean = np.einsum("tn,tnij->tij", views.there, across) / views.there.sum(axis=1)[:, None, None]
     spread = np.linalg.eigvalsh(mean)[:, 0]
     flat = spread < LEAST_PARALLAX**2
-    across[flat] = np.eye(3)  # any point, to be thrown away
+    across[flat] = np.eye(3)  # any point will do, as it is discarded
     origin = poses[:, :1, :3]
     position = poses[..., :3] - origin
     weight = views.there.astype(float)
     off = np.zeros(shape)
     for _ in range(ITERATIONS):
-        # The point nearest to all rays, each weighed by its doubt and by 1 / depth.
+        # The point nearest to all rays, weighted for robustness and by 1 / depth.
         normal = np.einsum("tn,tnij->tij", weight, across)
         target = np.einsum("tn,tnij,tnj->ti", weight, across, position)
         point = np.linalg.solve(normal, target[..., None])[..., 0]

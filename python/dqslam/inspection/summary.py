@@ -1,4 +1,4 @@
-"""What is in a recording, in numbers."""
+"""The content of a recording in numbers."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from dqslam import _core
 from dqslam.inspection.evidence import Evidence, Floats
 from dqslam.io import DetectionTable, Trajectory
 
-# A gap is so many times the median interval.
+# A gap is longer than this number of median intervals.
 GAP = 5.0
-# An edge is at the border of the image within so many pixels.
+# An edge within this number of pixels is at the border of the image.
 BORDER_PX = 1.5
 QUANTILES = (0.0, 0.25, 0.5, 0.75, 1.0)
 

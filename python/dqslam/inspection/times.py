@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from dqslam.inspection.evidence import Evidence, Finding, Floats
 
-# What a clock may count instead of seconds.
+# The units that a clock may count instead of seconds.
 UNITS = {"milliseconds": 1e-3, "microseconds": 1e-6, "nanoseconds": 1e-9}
-# Of the longer span: what is common where the units differ, and where they are put right.
+# The common share of the longer span: at most the first with different units, and at least the
+# second after a correction.
 APART, TOGETHER = 0.01, 0.5
 
 
 def check_times(evidence: Evidence) -> Finding | None:
-    """Compare the spans of poses and boxes, in seconds and with one of them in other units."""
+    """Compare the time spans of poses and boxes, in seconds and with one of them in other units."""
     poses, boxes = evidence.trajectory.timestamps, evidence.table.timestamp
     span = f"boxes {_span(boxes)}, poses {_span(poses)}"
     if _common(poses, boxes) <= APART:
@@ -26,7 +27,7 @@ def check_times(evidence: Evidence) -> Finding | None:
 
 
 def _common(poses: Floats, boxes: Floats) -> float:
-    """Return the part of the longer span that both have."""
+    """Return the share of the longer span that both have in common."""
     common = min(poses.max(), boxes.max()) - max(poses.min(), boxes.min())
     longer = max(float(poses.max() - poses.min()), float(boxes.max() - boxes.min()))
     return max(0.0, float(common)) / longer

@@ -1,4 +1,4 @@
-"""Which boxes show the same object: by their ids, else by overlap from frame to frame."""
+"""Boxes that show the same object, by their ids or by the overlap from frame to frame."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from dqslam.io import DetectionTable
 
 Ids = Literal["track_id", "class_id"]
 
-# Boxes of one class that overlap this much in successive frames are of one object.
+# Boxes of one class that overlap by this much in successive frames show one object.
 LEAST_OVERLAP = 0.5
-# A class that has one box in so many of its frames has one object.
+# A class with a single box in this share of its frames has one object.
 ALONE_SHARE = 0.95
-# What a track is worth: seen often, and not so often that it takes time.
+# The least number of boxes of a useful track, and the largest one that is used, to save time.
 FEWEST_VIEWS, MOST_VIEWS = 5, 40
 FEWEST_TRACKS, MOST_TRACKS = 3, 150
 LEAST_SCORE = 0.3
@@ -24,9 +24,9 @@ LEAST_SCORE = 0.3
 def find_tracks(table: DetectionTable, ids: Ids | None) -> list[NDArray[np.int64]]:
     """Return the rows of each track, in order of frames; longest tracks first.
 
-    Without ``ids`` boxes are joined by their overlap; where that gives next to nothing, as in
-    images far apart, classes of one object join them. Of two boxes of an object in a frame the
-    better counts; long tracks are thinned evenly.
+    Without ``ids``, boxes are joined by their overlap. If that finds almost nothing, because images
+    are far apart, boxes of a class with one object are joined. Of two boxes of an object in a frame
+    the one with the better score counts. Long tracks are thinned evenly.
     """
     rows = np.flatnonzero(table.score >= min(LEAST_SCORE, float(np.median(table.score))))
     if ids is not None:
@@ -39,7 +39,7 @@ def find_tracks(table: DetectionTable, ids: Ids | None) -> list[NDArray[np.int64
 
 
 def overlap_ids(table: DetectionTable, rows: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Give boxes (m,) one number that overlap best, both ways, from one frame to the next."""
+    """Give boxes (m,) one number if each overlaps the other best, from one frame to the next."""
     label = np.full(len(rows), -1, dtype=np.int64)
     order = np.argsort(table.frame[rows], kind="stable")
     starts = np.flatnonzero(np.diff(table.frame[rows][order])) + 1
@@ -73,7 +73,7 @@ def overlap(boxes: NDArray[np.float64], others: NDArray[np.float64]) -> NDArray[
 
 
 def _lone_classes(table: DetectionTable, rows: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Label boxes (m,) by their class where that has one object, else -1."""
+    """Label boxes (m,) by their class if it has one object, else by -1."""
     label = np.full(len(rows), -1, dtype=np.int64)
     for number in np.unique(table.class_id[rows]).tolist():
         of_class = np.flatnonzero(table.class_id[rows] == number)

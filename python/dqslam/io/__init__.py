@@ -1,4 +1,4 @@
-"""Files in and out, one module a format: conventions and errors are stated in each."""
+"""Files in and out: each format has a module, which states its conventions and errors."""
 
 from dqslam.io.camera import CAMERA_FORMATS as CAMERA_FORMATS
 from dqslam.io.camera import read_camera as read_camera

@@ -1,4 +1,4 @@
-"""From one format to another: nothing is cut, and what a format has no place for is said."""
+"""From one format to another: nothing is cut, and losses of a format are reported."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ FORMATS: dict[str, tuple[Format[Any], ...]] = {
     "trajectory": TRAJECTORY_FORMATS,
     "detections": DETECTION_FORMATS,
 }
-# What a bag becomes, unless one kind is asked for.
+# The files of a converted bag, unless one kind is selected.
 FROM_BAG = {
     "camera": (CAMERA_INFO, "camera.json", "json"),
     "trajectory": (ODOMETRY, "trajectory.txt", "tum"),
@@ -39,7 +39,7 @@ FROM_BAG = {
 
 @dataclass(frozen=True)
 class Written:
-    """A file that was written, what is in it, and what of the source it has no place for."""
+    """A file that was written, its content, and the parts of the source that the format lacks."""
 
     path: Path
     what: str
@@ -48,9 +48,9 @@ class Written:
 
 @dataclass(frozen=True)
 class ConvertContext:
-    """What the files themselves do not say; each is needed by some formats only."""
+    """Information that the files themselves lack; each part is needed by some formats only."""
 
-    size: tuple[int, int] | None = None  #: of the image, width and height in px
+    size: tuple[int, int] | None = None  #: width and height of the image in px
     frames: FrameTimes | None = None
     classes: dict[int, str] | None = None
     body_from_camera: ArrayLike | None = None
@@ -71,16 +71,17 @@ def convert(
     Parameters
     ----------
     source, out
-        Files, or folders. A bag becomes a folder of camera.json, trajectory.txt and boxes.csv, as
-        far as it has them, unless ``to`` names one format.
+        Files or folders. A bag becomes a folder with camera.json, trajectory.txt and boxes.csv,
+        as far as it has these, unless ``to`` names one format.
     format, to
-        Names of formats; by default the source is told by its look, the target by its ending.
+        Names of formats; by default the format of the source is recognized from the file, and
+        that of the target from its ending.
     topics
-        Of a bag, where a kind has several.
+        Topics of a bag that has several for a kind.
     context
         Size of the image, times of frames, names of classes, mount of the camera.
     progress
-        Told the share of a bag or a folder that is read; of other files that is not known.
+        Called with the share of a bag or a folder that has been read; not for other files.
     """
     source, out = Path(source), Path(out)
     if out.exists() and source.exists() and out.samefile(source):
@@ -112,12 +113,12 @@ def convert(
 
 
 def _tell_part(progress: Progress, done: int, parts: int, share: float) -> None:
-    """Tell the share of all parts from that of one, of which some are done."""
+    """Return a progress of one part that reports the share of all parts."""
     progress((done + share) / parts)
 
 
 def _kind(source: Path, format_name: str | None, to: str | None) -> str | None:
-    """Tell what the source is: None for a bag of which all is wanted."""
+    """Return the kind of the source, or None for a bag that is converted as a whole."""
     for name, option in ((to, "--to"), (format_name, "--format")):
         kinds = [kind for kind, known in KINDS.items() if name in known]
         if name is not None and not kinds:
@@ -177,7 +178,7 @@ def _convert(
         return _write_camera(out, camera, target)
     origin = choose_format(source, format_name, FORMATS[kind], kind)
     frames = context.frames
-    # Numbers of frames do where neither side has times.
+    # Numbers of frames are enough if neither side has times.
     timeless = frames is None and not origin.has_times(source)
     if timeless and not target.needs_times:
         frames = BY_NUMBER
@@ -237,7 +238,7 @@ def _write_detections(
 
 
 def _beside(out: Path, target: Format[Any], frames: ArrayLike, times: ArrayLike) -> list[Written]:
-    """Keep the times beside a file that has no place for them."""
+    """Write the times into a file beside one whose format lacks them."""
     if "times" not in target.loses:
         return []
     path = out.with_name(f"{out.stem}.frames.csv")

@@ -1,4 +1,4 @@
-"""CSV with a header: columns by name, in any order; # starts a comment line."""
+"""CSV with a header: columns are found by name, in any order; # starts a comment line."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from dqslam.io.files import FileError, parse_integers, parse_numbers, read_rows
 
 @dataclass(frozen=True, eq=False)
 class CsvTable:
-    """Cells as text, and conversions that blame the line."""
+    """Cells as text, and conversions whose errors name the line."""
 
     path: str
     columns: Mapping[str, tuple[str, ...]]
@@ -28,7 +28,7 @@ class CsvTable:
         return len(self.lines)
 
     def __contains__(self, name: str) -> bool:
-        """Tell whether there is a column of that name."""
+        """Return whether there is a column with this name."""
         return name in self.columns
 
     def cells(self, name: str) -> tuple[str, ...]:
@@ -61,7 +61,7 @@ class CsvTable:
 def read_csv(
     path: str | Path, *, required: Sequence[str] = (), allow_empty: bool = False
 ) -> CsvTable:
-    """Read a table that has the required columns and, unless told otherwise, a row at least."""
+    """Read a table that has the required columns and, by default, at least one row."""
     rows, lines = read_rows(path)
     try:
         header, *records = csv.reader(rows, strict=True)

@@ -1,4 +1,4 @@
-"""Rows, numbers, folders and JSON: errors name the file and the line, nothing is half written."""
+"""Rows, numbers, folders and JSON: errors name file and line, and files are written whole."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def _blame_cell(path: str | Path, name: str, cells: Sequence[str], lines: Sequen
 
 @contextlib.contextmanager
 def whole_folder(path: str | Path) -> Iterator[Path]:
-    """Give a temporary folder that becomes ``path`` if all goes well; what is there stays."""
+    """Give a temporary folder that becomes ``path`` in the end; ``path`` must be new or empty."""
     path = Path(path)
     if path.exists() and not (path.is_dir() and not any(path.iterdir())):
         raise FileError(path, "is there already, and not empty")
@@ -92,7 +92,7 @@ def write_json(path: str | Path, content: dict[str, Any]) -> None:
 
 
 def jsonable(value: Any) -> Any:
-    """Return plain lists, tables, texts and numbers; what is not finite becomes None."""
+    """Return plain lists, tables, texts and numbers; numbers that are not finite become None."""
     if isinstance(value, dict):
         return {str(key): jsonable(item) for key, item in value.items()}
     if isinstance(value, list | tuple):

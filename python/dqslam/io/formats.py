@@ -1,4 +1,4 @@
-"""What a file format is, and how the format of a file is told: by name, else by its look."""
+"""File formats, and the choice of the format of a file: by name, else by its content."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from dqslam.io.files import FileError, read_rows
 
 Content = TypeVar("Content")
 Progress = Callable[[float], None]
-"""What is told the share of a file, 0 to 1, that is read."""
+"""A function that is called with the share of a file, 0 to 1, that has been read."""
 
 
 def tell_nobody(share: float) -> None:
-    """Take the share, and do nothing with it."""
+    """Ignore the share."""
 
 
 @dataclass(frozen=True)
 class Look:
-    """What a format is recognized by: the path, and the first line that is no comment."""
+    """The properties that identify a format: the path, and the first line that is not a comment."""
 
     path: Path
-    first: str  #: "" where the path is a folder, or no text
+    first: str  #: "" if the path is a folder or not a text
 
     @property
     def suffix(self) -> str:
@@ -37,28 +37,28 @@ class Format(Generic[Content]):
     """One file format of cameras, trajectories or detections."""
 
     name: str
-    looks: str  #: what it is recognized by, in words
+    looks: str  #: the properties that identify it, in words
     recognize: Callable[[Look], bool]
     read: Callable[..., Content]
     write: Callable[..., None] | None = None
-    needs_times: bool = True  #: else a file may count frames, and have no times
-    has_times: Callable[[Path], bool] = lambda _: True  #: tells whether a file has them
-    endings: tuple[str, ...] = ()  #: of files that are written in it unless told otherwise
-    loses: tuple[str, ...] = ()  #: what it has no place for
+    needs_times: bool = True  #: if False, a file may count frames and have no times
+    has_times: Callable[[Path], bool] = lambda _: True  #: returns whether a file has times
+    endings: tuple[str, ...] = ()  #: endings of files that are written in this format by default
+    loses: tuple[str, ...] = ()  #: the data that the format lacks
     tells_share: bool = False  #: whether `read` has a `progress`, a `Progress`
 
 
 def choose_format(
     path: str | Path, name: str | None, formats: Sequence[Format[Content]], kind: str
 ) -> Format[Content]:
-    """Find the format of that name, or the first whose look the file has.
+    """Find the format with this name, or the first that the file looks like.
 
     Raises
     ------
     ValueError
-        The name is not one of the formats'.
+        If no format has the name.
     FileError
-        There is no such file, or it looks like none of them.
+        If there is no such file, or it looks like none of the formats.
     """
     if name is not None:
         return named_format(name, formats, kind)
@@ -75,7 +75,7 @@ def choose_format(
 
 
 def named_format(name: str, formats: Sequence[Format[Content]], kind: str) -> Format[Content]:
-    """Find the format of that name."""
+    """Find the format with this name."""
     for format_ in formats:
         if format_.name == name:
             return format_
@@ -84,7 +84,7 @@ def named_format(name: str, formats: Sequence[Format[Content]], kind: str) -> Fo
 
 
 def look_at(path: str | Path) -> Look:
-    """Look at a file or folder that must be there."""
+    """Return the look of a file or folder, which must exist."""
     path = Path(path)
     if not path.exists():
         raise FileError(path, "no such file")

@@ -1,10 +1,11 @@
-"""When a frame was taken, for formats that number frames and have no times.
+"""Times of frames, for formats that number frames and have no times.
 
 Frames count from 0. A file of times is one of
 
-- a KITTI ``times.txt``: one number a line, line i for frame i;
-- a TUM ``rgb.txt``: ``time filename`` a line, line i for frame i; a box may name the image instead;
-- CSV with the columns ``frame`` and ``timestamp``, any others beside.
+- a KITTI ``times.txt`` with one number per line, where line i is for frame i;
+- a TUM ``rgb.txt`` with ``time filename`` per line, where line i is for frame i; a box may have the
+  name of the image as well;
+- CSV with the columns ``frame`` and ``timestamp``, and any other columns.
 
 Times are seconds and increase with the frame.
 """
@@ -30,16 +31,16 @@ class FrameTimes:
     """Times of frames: a table of them, or a rate."""
 
     source: str
-    table: dict[int, float] | None = None  #: seconds of a frame
-    rate: float = 1.0  #: frames a second, where there is no table
+    table: dict[int, float] | None = None  #: time of each frame in seconds
+    rate: float = 1.0  #: frames per second if there is no table
     names: dict[str, int] = field(
         default_factory=dict
-    )  #: frame of an image, by name without ending
+    )  #: frame of each image, by its name without ending
 
     def at(
         self, path: str | Path, frames: NDArray[np.int64], lines: Sequence[int]
     ) -> NDArray[np.float64]:
-        """Return the times (n,) s of ``frames`` (n,) that stand in these lines of a file."""
+        """Return the times (n,) s of ``frames`` (n,); errors name the lines of the file."""
         if self.table is None:
             return frames / self.rate
         for frame, line in zip(frames.tolist(), lines, strict=True):
@@ -48,7 +49,7 @@ class FrameTimes:
         return np.array([self.table[frame] for frame in frames.tolist()], dtype=float)
 
 
-#: Time is the number of the frame: for a trajectory and boxes that both count frames.
+#: The time is the number of the frame, for a trajectory and boxes that both count frames.
 BY_NUMBER = FrameTimes("the number of the frame")
 
 
@@ -92,7 +93,7 @@ def read_frame_times(path: str | Path) -> FrameTimes:
 
 
 def write_frame_times(path: str | Path, frames: ArrayLike, times: ArrayLike) -> None:
-    """Write the times (n,) s of frames (n,) as CSV that read_frame_times takes; repeats are one."""
+    """Write the times (n,) s of frames (n,) as CSV for read_frame_times, each frame once."""
     write_text(path, frame_table(frames, times))
 
 
@@ -111,10 +112,10 @@ def image_name(name: str) -> str:
 
 
 def frame_of(name: str, frames: FrameTimes | None) -> int | None:
-    """Return the frame of an image: its place in the times, else the number that is its name.
+    """Return the frame of an image: its place in the times, else the number in its name.
 
-    The number may follow a prefix: ``000042``, ``left_42``, ``frame-000042``. None where there is
-    neither.
+    The number may follow a prefix: ``000042``, ``left_42``, ``frame-000042``. The frame is None if
+    there is neither.
     """
     name = image_name(name)
     if frames is not None and name in frames.names:

@@ -1,4 +1,4 @@
-"""Which image file was taken at which pose: by time stamps, by numbers of frames, or by order."""
+"""The image file of each pose, by time stamps, by numbers of frames, or by order."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ def find_images(
 ) -> dict[int, Path]:
     """Return the image file of each pose that has one, by row; times of the poses (n,), seconds.
 
-    What tells an image's time is the first of
+    The time of an image comes from the first of
 
     - ``frames``, by the name of the image or the number in it;
     - its name, if all names are times in seconds (``1311868164.363181.png``; ``000703.png`` where
       poses are at whole seconds) or nanoseconds: the image nearest in time is taken, within half
       the median interval of the poses;
-    - its place among the names in their order, if there are as many images as poses.
+    - its place in the order of names, if there are as many images as poses.
     """
     folder = Path(folder)
     if not folder.is_dir():
@@ -66,10 +66,10 @@ def _framed(files: list[Path], frames: FrameTimes) -> tuple[list[Path], Floats]:
 
 
 def _times(files: list[Path], timestamps: Floats) -> Floats | None:
-    """Return the times that the names are; None unless all are.
+    """Return the times in the names, or None unless all names are times.
 
-    Whole numbers are mostly those of frames: they are times of poses at whole seconds, or so long
-    that they must be nanoseconds.
+    Whole numbers are usually numbers of frames. They are times only if poses are at whole seconds,
+    or if they are so long that they must be nanoseconds.
     """
     names = [image_name(file.name) for file in files]
     try:

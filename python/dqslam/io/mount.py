@@ -1,7 +1,8 @@
-"""How the camera sits in the body whose trajectory is given: body_from_camera, meters.
+"""The pose of the camera in the body of the trajectory: body_from_camera, meters.
 
-A text of 7 numbers ``tx ty tz qx qy qz qw``, or of the 12 or 16 of a matrix [R t], row by row, with
-spaces, commas or brackets between; or the ``T_BS`` of EuRoC's camera ``sensor.yaml``.
+The file is a text with 7 numbers ``tx ty tz qx qy qz qw``, or with the 12 or 16 numbers of a matrix
+[R t], row by row, separated by spaces, commas or brackets. Or it is EuRoC's camera ``sensor.yaml``
+with ``T_BS``.
 """
 
 from __future__ import annotations

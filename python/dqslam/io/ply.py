@@ -1,8 +1,8 @@
 """A map as PLY, for MeshLab, CloudCompare, Blender and trimesh.
 
-Vertices ``x y z`` [m] in the world of the map, colored, with the ``object_id`` they belong to, -1
-for the trajectory. Ellipsoids are faces, what is no ellipsoid is one vertex, and the trajectory is
-its positions with an ``edge`` from each to the next.
+Vertices are ``x y z`` [m] in the world of the map, with a color and the ``object_id`` to which they
+belong, -1 for the trajectory. Ellipsoids have faces, and an object that is not an ellipsoid is one
+vertex. The trajectory has its positions, with an ``edge`` from each to the next.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def write_ply(
     colors
         Red, green and blue of each object, 0 to 255.
     trajectory_color
-        Likewise of the trajectory.
+        Red, green and blue of the trajectory, 0 to 255.
     """
     if len(colors) != len(results.objects):
         raise ValueError(f"colors: expected {len(results.objects)}, got {len(colors)}")
@@ -94,7 +94,7 @@ def _lines(
 
 
 def _body(results: Results, row: int, sphere: Floats) -> Floats:
-    """Return the vertices of an object, (v, 3); its center alone where it is no ellipsoid."""
+    """Return the vertices of an object, (v, 3); only its center if it is not an ellipsoid."""
     from scipy.spatial.transform import Rotation
 
     objects = results.objects

@@ -1,4 +1,4 @@
-"""A recording from files: boxes meet the poses of their time, and the objects of their id."""
+"""A recording from files: boxes get the pose of their time and the object of their id."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from dqslam.io.step_covariances import read_step_covariances
 from dqslam.io.trajectory import read_trajectory
 from dqslam.recording import Detections, Odometry, Recording
 
-# Two boxes do not tell an object's distance from its size when the path is noisy.
+# With two boxes and a noisy path, an object's distance and size cannot be separated.
 FEWEST_BOXES = 3
 
 Ids = Literal["none", "track_id", "class_id"]
@@ -28,13 +28,13 @@ Ids = Literal["none", "track_id", "class_id"]
 
 @dataclass(frozen=True)
 class Dropped:
-    """Boxes of the files that are not in the recording, and why."""
+    """Numbers of boxes of the files that are not in the recording, by reason."""
 
     below_min_score: int  #: boxes
     without_id: int  #: boxes whose id is -1 or empty
     without_pose: int  #: boxes with no pose near enough in time
-    repeated: int  #: boxes beside a better one of the same object on the same pose
-    few_boxes: dict[int, int]  #: object id: boxes, of objects seen fewer than 3 times
+    repeated: int  #: boxes with a better one of the same object at the same pose
+    few_boxes: dict[int, int]  #: number of boxes of each object id with fewer than 3
 
     @property
     def total(self) -> int:
@@ -57,7 +57,7 @@ def load_recording(
     formats: FormatNames | None = None,
     frames: FrameTimes | None = None,
 ) -> tuple[Recording, Dropped]:
-    """Read a recording in SE(3), the robot being the camera, and what had to be left out of it.
+    """Read a recording in SE(3), where the robot is the camera, and what had to be left out.
 
     Parameters
     ----------
@@ -67,19 +67,19 @@ def load_recording(
     min_score
         Boxes with a lower score are left out.
     ids
-        The column that tells which boxes show the same object; "none" leaves that open.
+        The column of ids that are equal for boxes of the same object; "none" leaves objects open.
     final_ids
-        Whether these ids are believed: a box without one is left out then, as are the lesser of
-        two boxes with one id in an image, and ids of fewer than 3 boxes.
+        Whether these ids are final. If so, a box without an id is left out, and so are the worse
+        of two boxes with one id in an image, and ids with fewer than 3 boxes.
     max_time_difference
-        A box belongs to the nearest pose in time, if that is within this many seconds; by default
-        half the median interval between poses.
+        A box belongs to the nearest pose in time if that is within this number of seconds; by
+        default half the median interval between poses.
     odometry_noise
-        The uncertainty of one step, which trajectory files do not carry.
+        The uncertainty of one step, which trajectory files do not have.
     odometry_covariance
-        In its place, a file of the covariance of each step: see ``io.step_covariances``.
+        A file with the covariance of each step, used instead: see ``io.step_covariances``.
     formats
-        Names of the formats, where files do not look like what they are.
+        Names of the formats, for files that cannot be recognized.
     frames
         Times of the frames, for files that only count them: see ``choose_frame_times``.
 
@@ -145,7 +145,7 @@ def load_recording(
 def nearest_pose(
     pose_times: NDArray[np.float64], times: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Find the pose nearest in time to each of ``times`` (m,): its row, and how far off in s."""
+    """Find the pose nearest in time to each of ``times`` (m,): its row, and the difference in s."""
     after = np.clip(np.searchsorted(pose_times, times), 1, len(pose_times) - 1)
     nearer_before = times - pose_times[after - 1] <= pose_times[after] - times
     pose = (after - nearer_before).astype(np.int64)
@@ -189,13 +189,13 @@ def _select(
     min_score: float,
     tolerance: float,
 ) -> tuple[NDArray[np.int64], Dropped]:
-    """Choose rows: one box an object and pose, at least 3 an object; in order of pose, object."""
+    """Choose rows: one box per object and pose, at least 3 per object, by pose and object."""
     score = table.score
     scored = score >= min_score
     named = scored & (object_id >= 0)
     timely = named & (late <= tolerance)
     rows = np.flatnonzero(timely)
-    # The nearest in time first, and of one image the best score.
+    # The box nearest in time comes first, and of those in one image the one with the best score.
     order = rows[np.lexsort((-score[rows], late[rows], object_id[rows], pose[rows]))]
     again = (pose[order][1:] == pose[order][:-1]) & (object_id[order][1:] == object_id[order][:-1])
     best = order[np.concatenate([[True], ~again])[: len(order)]]
@@ -219,7 +219,7 @@ def _select_images(
     min_score: float,
     tolerance: float,
 ) -> tuple[NDArray[np.int64], Dropped]:
-    """Choose rows: all boxes of the image that is nearest in time to each pose; in their order."""
+    """Choose rows, in their order: all boxes of the image that is nearest in time to each pose."""
     scored = table.score >= min_score
     timely = scored & (late <= tolerance)
     rows = np.flatnonzero(timely)
@@ -239,7 +239,7 @@ def _select_images(
 def _nothing_left(
     table: DetectionTable, dropped: Dropped, ids: Ids, tolerance: float, times: NDArray[np.float64]
 ) -> str:
-    """Say why none of the boxes can be used."""
+    """Return the reason why none of the boxes can be used."""
     unnamed = "" if ids == "none" else f"{dropped.without_id} without {ids}, "
     return (
         f"no object is left of {len(table.line)} boxes: {dropped.below_min_score} below the least "

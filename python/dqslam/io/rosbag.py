@@ -1,6 +1,6 @@
 """ROS bags (ROS 1 .bag, rosbag2 folders of sqlite3 or mcap, .mcap and .db3 files), without ROS.
 
-Needs the package `rosbags`: pip install 'dqslam[rosbag]'. Message types that a bag does not
+This needs the package `rosbags`: pip install 'dqslam[rosbag]'. Message types that a bag does not
 describe itself are those of ROS 2 Humble and of vision_msgs 4.
 """
 
@@ -18,7 +18,7 @@ NAME = "rosbag"
 LOOKS = "a .bag, .mcap or .db3 file, or a folder with metadata.yaml"
 ENDINGS = (".bag", ".mcap", ".db3")
 
-# vision_msgs 4: older bags of sqlite3 have no description of their messages.
+# The types of vision_msgs 4, because older bags of sqlite3 do not describe their messages.
 VISION_MSGS = {
     "vision_msgs/msg/Point2D": "float64 x\nfloat64 y\n",
     "vision_msgs/msg/Pose2D": "vision_msgs/Point2D position\nfloat64 theta\n",
@@ -40,23 +40,23 @@ VISION_MSGS = {
 
 
 def looks_like_bag(look: Look) -> bool:
-    """Tell by the ending, or by the description that a rosbag2 folder has."""
+    """Return whether a path is a bag, by its ending or by the metadata of a rosbag2 folder."""
     return look.suffix in ENDINGS or (look.path / "metadata.yaml").is_file()
 
 
 def messages(
     path: str | Path, kind: str, topic: str | None, progress: Progress = tell_nobody
 ) -> Iterator[tuple[str, Any]]:
-    """Give the messages of one kind (``nav_msgs/msg/Odometry``) and where each stands, in order.
+    """Yield the messages of one kind (``nav_msgs/msg/Odometry``) with their places, in order.
 
-    `progress` is told the share of them that was given.
+    `progress` is called with the share of the messages that was yielded.
 
     Raises
     ------
     FileError
-        The bag cannot be read, or it does not tell which topic is meant.
+        If the bag cannot be read, or if the topic is ambiguous.
     RuntimeError
-        The package `rosbags` is missing.
+        If the package `rosbags` is missing.
     """
     with _opened(path) as bag:
         name = _topic(path, _topics(bag), kind, topic)
@@ -89,7 +89,7 @@ def _opened(path: str | Path) -> Iterator[Any]:
     except FileError:
         raise
     except Exception as error:
-        # A broken bag fails in rosbags, in sqlite or in a codec, and each has errors of its own.
+        # A broken bag can fail in rosbags, in sqlite or in a codec, and each has its own errors.
         raise FileError(path, f"is no bag that can be read: {error}") from error
 
 
@@ -98,7 +98,7 @@ def _topics(bag: Any) -> list[tuple[str, str]]:
 
 
 def topic_option(format_name: str, topic: str | None) -> dict[str, str]:
-    """Return the argument that tells the reader of a bag its topic; nothing without a topic."""
+    """Return the keyword argument for the topic of a bag's reader, or nothing without a topic."""
     if topic is None:
         return {}
     if format_name != NAME:

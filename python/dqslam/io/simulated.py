@@ -1,4 +1,4 @@
-"""A recording and its truth into the files that the rest of the program reads."""
+"""Files of a simulated recording and its truth, which the rest of the program reads."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from dqslam.recording import Recording, Truth
 def save_recording(recording: Recording, directory: str | Path) -> None:
     """Write camera.json, odometry.txt, odometry_covariance.csv and boxes.csv: see `load_recording`.
 
-    The odometry as the poses that it leads to, world_from_camera. The id of an object is its
-    track_id. Relative positions are left out: no format has a place for them.
+    The odometry is written as the poses that it leads to, world_from_camera. The id of an object is
+    its track_id. Relative positions are left out, because no format has them.
 
     Raises
     ------
     ValueError
-        When the lens has distortion: files have boxes of the image as it was recorded.
+        If the lens has distortion, because files have boxes of the image as it was recorded.
     """
     if recording.camera.has_distortion:
         raise ValueError("recording.camera: boxes of a lens with distortion cannot be written")
@@ -57,7 +57,7 @@ def save_recording(recording: Recording, directory: str | Path) -> None:
 def save_truth(truth: Truth, recording: Recording, directory: str | Path) -> None:
     """Write groundtruth.txt, objects.csv and true_boxes.csv, for `dqslam evaluate`.
 
-    An object that is no ellipsoid has the size of a cube of its volume, and no orientation.
+    An object that is not an ellipsoid has the size of a cube of its volume, and no orientation.
     """
     directory = Path(directory)
     _write_path(directory / "groundtruth.txt", recording, truth.pose_model, truth.poses)
@@ -85,7 +85,7 @@ def _write_path(path: Path, recording: Recording, model: _core.PoseModel, poses:
 
 
 def _columns(numbers: Floats) -> list[Sequence[object]]:
-    """Give numbers (n, k) as k columns of texts that read back to the last bit."""
+    """Return numbers (n, k) as k columns of texts, without loss of a bit."""
     return [[repr(value) for value in column] for column in numbers.T.tolist()]
 
 

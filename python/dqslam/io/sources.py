@@ -1,4 +1,4 @@
-"""What belongs together when several files are read: names of formats, and times of frames."""
+"""Settings for several files together: names of formats, and times of frames."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from dqslam.io.trajectory import TRAJECTORY_FORMATS
 
 
 class FormatNames(NamedTuple):
-    """The format of each file, None where the look of the file tells."""
+    """The format of each file, or None if it is recognized from the file."""
 
     camera: str | None = None
     trajectory: str | None = None
@@ -37,15 +37,15 @@ KINDS = dict(
 
 
 def split_formats(names: Sequence[str]) -> FormatNames:
-    """Sort names of formats by what they are of; each name says it, ``rosbag`` is all three.
+    """Sort names of formats by their kind of file; ``rosbag`` is for all three kinds.
 
     Raises
     ------
     ValueError
-        A name is unknown, or two are of the same kind.
+        If a name is unknown, or two are of the same kind.
     """
     chosen: dict[str, str] = {}
-    # The bag fills what no other name has claimed.
+    # The bag is the format of the kinds that have no other.
     for name in sorted(names, key=lambda name: sum(name in known for known in KINDS.values())):
         kinds = [kind for kind, known in KINDS.items() if name in known]
         if not kinds:
@@ -74,7 +74,7 @@ def choose_frame_times(
 
 
 def kind_of(path: str | Path) -> str | None:
-    """Tell by its look whether a file is of a camera, a trajectory or detections; None of a bag."""
+    """Recognize whether a file has a camera, a trajectory or detections; None for a bag."""
     look = look_at(path)
     if looks_like_bag(look):
         return None

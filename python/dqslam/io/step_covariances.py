@@ -1,8 +1,8 @@
-"""The covariance of each step of odometry, which no format of trajectories has a place for.
+"""The covariance of each step of odometry, which no format of trajectories has.
 
-CSV with the columns of ``covariance.csv`` in results: ``timestamp``, that of the pose at which the
-step ends, and ``c11 c12 .. c66``, the upper triangle of the covariance of the motion [m, rad] in
-the frame of the camera there.
+It is CSV with the columns of ``covariance.csv`` in results. ``timestamp`` is that of the pose at
+which the step ends, and ``c11 c12 .. c66`` are the upper triangle of the covariance of the motion
+[m, rad] in the frame of the camera there.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from dqslam.io.files import FileError
 from dqslam.io.results.covariances import motion_of_camera, read_covariances, write_rows
 from dqslam.recording import Recording
 
-# What odometry on the plane has no noise in, height and tilt, m and rad a step: a covariance in
-# space must not be singular.
+# Sigma of height and tilt for odometry on the plane, m and rad per step. Such odometry has no noise
+# in these, but a covariance in space must not be singular.
 OUT_OF_PLANE_SIGMA = 1e-3
 
 
 def read_step_covariances(path: str | Path, timestamps: Floats) -> Floats:
-    """Read those of the steps between the poses at these times (n,), shape (n - 1, 6, 6)."""
+    """Read the covariances of the steps between poses at these times (n,), shape (n - 1, 6, 6)."""
     covariance = read_covariances(path, timestamps)[1:]
     for time, one in zip(timestamps[1:], covariance, strict=True):
         if not np.isfinite(one).all():
@@ -34,7 +34,7 @@ def read_step_covariances(path: str | Path, timestamps: Floats) -> Floats:
 
 
 def write_step_covariances(path: str | Path, recording: Recording) -> None:
-    """Write those of a recording as they are for its camera."""
+    """Write the covariances of a recording's steps, converted to those of its camera."""
     model, covariance = recording.odometry.pose_model, recording.odometry.covariance
     camera_from_robot = motion_of_camera(model, recording.camera)
     moved = camera_from_robot @ covariance @ camera_from_robot.T

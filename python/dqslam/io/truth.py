@@ -1,6 +1,7 @@
-"""The truth of a recording as CSV: where its objects are, and which object each box shows.
+"""The truth of a recording as CSV: the places of its objects, and the object that each box shows.
 
-Objects, a row each; columns by name, in any order, others ignored; # starts a comment line:
+Objects have one row each. Columns are found by name, in any order, and others are ignored; # starts
+a comment line:
 
 ``object_id`` (or ``track_id``, ``id``)
     Whole number, optional.
@@ -13,11 +14,11 @@ Objects, a row each; columns by name, in any order, others ignored; # starts a c
 ``sx sy sz`` (or ``size_x size_y size_z``)
     Full sizes along the object's own axes, meters, optional.
 ``length height width``
-    In their place, KITTI's: sizes along x, y (down) and z, and ``yaw`` turns about the y axis.
+    KITTI's sizes instead of these, along x, y (down) and z; ``yaw`` then turns about the y axis.
 ``static``
     0 for an object that moves, optional.
 
-Boxes: the columns ``timestamp x1 y1 x2 y2`` of a detection file, and one of object ids.
+Boxes have the columns ``timestamp x1 y1 x2 y2`` of a detection file, and one of object ids.
 """
 
 from __future__ import annotations
@@ -40,13 +41,13 @@ QUATERNION = ("qx", "qy", "qz", "qw")
 KITTI_SIZES = ("length", "height", "width")
 SIZES = (("sx", "sy", "sz"), ("size_x", "size_y", "size_z"), KITTI_SIZES)
 EDGES = ("x1", "y1", "x2", "y2")
-# Files round quaternions; a length further off is a mistake.
+# Files round quaternions; a larger error of the norm is a mistake.
 NORM_TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
 class TrueObjects:
-    """Objects as they are; None for what the file does not say."""
+    """The true objects; None for values that are not in the file."""
 
     path: str
     id: Ints | None
@@ -60,7 +61,7 @@ class TrueObjects:
     size: Floats | None
     """Full sizes along the object's own axes, meters, shape (t, 3)."""
     static: Bools
-    """Whether it stands still, shape (t,); all do when the file does not say."""
+    """Whether it stands still, shape (t,); all do if the file has no such column."""
 
     def __len__(self) -> int:
         """Return the number of objects."""
@@ -77,7 +78,7 @@ class TrueBoxes:
     box: Floats
     """[u_min, v_min, u_max, v_max] in undistorted pixels, shape (t, 4)."""
     object_id: Ints
-    """Which object it shows, -1 where that is unknown; shape (t,)."""
+    """The object that it shows, -1 if unknown; shape (t,)."""
 
 
 def read_true_objects(path: str | Path) -> TrueObjects:
@@ -108,7 +109,7 @@ def read_true_objects(path: str | Path) -> TrueObjects:
 def read_true_boxes(
     path: str | Path, camera: _core.Camera, id_column: str = "track_id"
 ) -> TrueBoxes:
-    """Read the boxes of known objects, and undistort them; an empty id is unknown, -1."""
+    """Read the boxes of known objects, and undistort them; an empty id means unknown, -1."""
     table = read_csv(path, required=("timestamp", *EDGES, id_column))
     box = _columns(table, EDGES)
     table.reject(np.any(box[:, 2:] <= box[:, :2], axis=1), "empty box: x1 < x2, y1 < y2")

@@ -1,4 +1,4 @@
-"""YAML with errors that name the file and the line. Needs PyYAML: pip install 'dqslam[yaml]'."""
+"""YAML with errors that name the file and the line, by PyYAML: pip install 'dqslam[yaml]'."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def parse_yaml(path: str | Path, text: str) -> dict[str, Any]:
     except ImportError:
         message = f"{path}: YAML is read with PyYAML, which is missing: pip install 'dqslam[yaml]'"
         raise RuntimeError(message) from None
-    # OpenCV starts its files with %YAML:1.0, which is no YAML; `rostopic echo` ends with ---.
+    # OpenCV starts its files with %YAML:1.0, which is not YAML; `rostopic echo` ends with ---.
     try:
         table = next(iter(yaml.safe_load_all(text.replace("%YAML:1.0", "---", 1))), None)
     except yaml.MarkedYAMLError as error:

@@ -1,6 +1,6 @@
 """The motion that brings an estimate into the world of the truth.
 
-Rotations and poses are those of ``blocks.h``: world_from_camera, [tx ty tz qx qy qz qw], meters.
+Rotations and poses follow ``blocks.h``: world_from_camera, [tx ty tz qx qy qz qw], meters.
 """
 
 from dataclasses import dataclass
@@ -38,8 +38,8 @@ class Alignment:
 def align_rigid(points: Floats, true_points: Floats) -> Alignment:
     """Find the rigid motion, without scale, that brings points nearest to the true ones.
 
-    Umeyama's closed form of least squares; both of shape (n, k), k = 2 for SE(2), 3 for SE(3).
-    Where all points lie on a line (k = 3), the turn about that line is arbitrary.
+    This is Umeyama's closed form of least squares. Both have shape (n, k), with k = 2 for SE(2) and
+    3 for SE(3). If all points lie on a line (k = 3), the rotation about that line is arbitrary.
     """
     return _umeyama(points, true_points, with_scale=False)
 
@@ -47,8 +47,8 @@ def align_rigid(points: Floats, true_points: Floats) -> Alignment:
 def align_positions(points: Floats, true_points: Floats, align: Align = "se3") -> Alignment:
     """Find the motion of a kind that brings positions nearest to the true ones, shape (n, 3).
 
-    "se3" a rigid motion, "sim3" with a scale, "se2" along and about the z axis only (heights stay),
-    "none" no motion at all.
+    "se3" is a rigid motion, "sim3" a rigid motion with a scale, "se2" a motion in the x-y plane
+    that keeps heights, and "none" no motion.
     """
     points, true_points = same_shape(points, true_points)
     if points.shape[1] != 3:
@@ -66,9 +66,9 @@ def align_poses(
 ) -> Alignment:
     """Find the motion of a kind that brings poses, not positions alone, nearest to the true ones.
 
-    It minimizes, over all poses, the squared distances of the position and of the six points at
-    ``lever`` meters along the axes of the camera, ahead of it among them: where objects are.
-    Hence no turn is free, not even about a straight path.
+    Over all poses, it minimizes the squared distances of the position and of the six points at
+    ``lever`` meters along the axes of the camera. One of these is ahead of the camera, where
+    objects are. Hence every rotation is determined, even about a straight path.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def align_poses(
     align
         As in ``align_positions``; the scale of "sim3" comes from the positions.
     lever
-        Meters: how far from the cameras the points are that shall fit.
+        Distance of the six points from the cameras, meters.
     """
     from scipy.spatial.transform import Rotation
 
@@ -95,7 +95,7 @@ def align_poses(
         scale = _umeyama(points, true_points, with_scale=True).scale
     middle, true_middle = scale * points[:, :size].mean(axis=0), true_points[:, :size].mean(axis=0)
     turns, true_turns = (Rotation.from_quat(p[:, 3:]).as_matrix() for p in (poses, true_poses))
-    # Of the six points p +- lever R e_k the terms with p add up to 6 p, those with R to R R^T.
+    # For the six points p +- lever R e_k, the terms with p add up to 6 p and those with R to R R^T.
     correlation = (
         7.0 * (true_points[:, :size] - true_middle).T @ (scale * points[:, :size] - middle)
         + 2.0 * lever**2 * np.einsum("nij,nkj->ik", true_turns, turns)[:size, :size]
@@ -106,7 +106,7 @@ def align_poses(
 
 
 def same_shape(points: Floats, true_points: Floats) -> tuple[Floats, Floats]:
-    """Return two tables of the same shape (n, k), n at least 1, checked."""
+    """Return two tables after a check that they have the same shape (n, k), n at least 1."""
     points = as_floats("estimated points", points, [None, None])
     true_points = as_floats("true points", true_points, [None, None])
     if points.shape != true_points.shape:
@@ -139,7 +139,7 @@ def _umeyama(points: Floats, true_points: Floats, *, with_scale: bool) -> Alignm
 
 
 def _nearest_rotation(correlation: Floats) -> tuple[Floats, float]:
-    """Return the rotation R, shape (k, k), that maximizes trace(R^T correlation), and that."""
+    """Return the rotation R, (k, k), that maximizes trace(R^T correlation), and the maximum."""
     u, values, vt = np.linalg.svd(correlation)
     no_mirror = np.ones(len(values))
     no_mirror[-1] = np.sign(np.linalg.det(u) * np.linalg.det(vt))
@@ -147,7 +147,7 @@ def _nearest_rotation(correlation: Floats) -> tuple[Floats, float]:
 
 
 def _lifted(on_plane: Alignment) -> Alignment:
-    """Return a motion of the x y plane as one of space that keeps heights."""
+    """Return a motion of the x-y plane as one of space that keeps heights."""
     rotation, translation = np.eye(3), np.zeros(3)
     rotation[:2, :2], translation[:2] = on_plane.rotation, on_plane.translation
     return Alignment(rotation, translation)

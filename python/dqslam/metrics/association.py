@@ -1,4 +1,4 @@
-"""How well boxes were told apart: which object each was taken for, against the truth."""
+"""The quality of an association: the object that each box was assigned to, against the truth."""
 
 from dataclasses import dataclass
 
@@ -9,39 +9,39 @@ from dqslam._checks import Ints, as_ints
 
 @dataclass(frozen=True)
 class AssociationScore:
-    """Boxes and objects, right and wrong."""
+    """Numbers of right and wrong boxes and objects."""
 
     boxes: int
-    """Boxes that were judged."""
+    """Number of boxes that were compared."""
     precision: float
-    """Of pairs of boxes taken for one object, the share that show one; NaN without such pairs."""
+    """Share of the pairs of boxes assigned to one object that show one; NaN without such pairs."""
     recall: float
-    """Of pairs of boxes that show one object, the share taken for one; NaN without such pairs."""
+    """Share of the pairs of boxes that show one object which are assigned to one; else NaN."""
     purity: float
-    """Share of the boxes taken for an object that show what most of that object's boxes show."""
+    """Share of the assigned boxes that show the same as most boxes of their object."""
     id_switches: int
-    """Along the boxes of a true object in time, how often the object they are taken for changes."""
+    """Number of changes of the assigned object along the boxes of a true object in time."""
     found: int
-    """True objects that some object consists of, for the most part."""
+    """Number of true objects that are shown by most boxes of some object."""
     missed: int
-    """True objects that none does."""
+    """Number of true objects that were not found."""
     split: int
-    """Objects beyond the first of the same true object."""
+    """Number of objects in excess of one for the same true object."""
     invented: int
-    """Objects that consist of boxes of nothing, for the most part."""
+    """Number of objects of which most boxes show nothing."""
 
 
 def score_association(pose: Ints, object_id: Ints, true_id: Ints) -> AssociationScore:
-    """Judge which object each box was taken for.
+    """Compare the object of each box with the truth.
 
     Parameters
     ----------
     pose
-        Row of the pose that saw the box, rising with time; shape (m,).
+        Row of the pose from which the box was observed, ascending in time, shape (m,).
     object_id
-        What the box was taken for, -1 for nothing; shape (m,).
+        The object that the box was assigned to, -1 for none, shape (m,).
     true_id
-        What it shows, -1 for nothing (a false positive); shape (m,).
+        The true object that the box shows, -1 for none (a false positive), shape (m,).
     """
     object_id = as_ints("object_id", object_id)
     true_id = as_ints("true_id", true_id, len(object_id))
@@ -82,9 +82,9 @@ def _contingency(object_id: Ints, true_id: Ints) -> Ints:
 
 
 def _majorities(object_id: Ints, true_id: Ints) -> tuple[Ints, Ints]:
-    """Return, for each object, what most of its boxes show (-1: nothing), and how many do.
+    """Return the true object that most boxes of each object show (-1 for none), and their number.
 
-    Of equals it is the lowest id that shows something.
+    If several are equal, it is the lowest id of a true object.
     """
     shown, most = [], []
     for one in np.unique(object_id):

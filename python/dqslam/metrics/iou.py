@@ -1,4 +1,4 @@
-"""Intersection over union: of boxes in the image, and of ellipsoids in space."""
+"""Intersection over union of boxes in the image, and of ellipsoids in space."""
 
 import numpy as np
 
@@ -20,8 +20,9 @@ def match_boxes(
 ) -> Ints:
     """Return the row of the true box that each box shows, -1 for none; shape (m,).
 
-    Of the boxes of one pose, pairs are chosen so that their IoUs add up to the most; one below
-    ``min_iou`` is no pair. Poses are row numbers, shapes (m,) and (t,), boxes (m, 4) and (t, 4).
+    The pairs of each pose are those with the largest sum of IoUs; a pair with an IoU below
+    ``min_iou`` does not count. Poses are row numbers, shapes (m,) and (t,); boxes have shapes
+    (m, 4) and (t, 4).
     """
     from scipy.optimize import linear_sum_assignment
 
@@ -45,9 +46,10 @@ def reprojection_iou(
 ) -> Floats:
     """Return the IoU of each box with the projection of its ellipsoid, shape (m,).
 
-    Row by row: poses (m, 7), ellipsoids (m, 9), NaN where one is none, boxes and flags of their
-    edges (m, 4); the camera has no mount. Behind a truncated edge nothing can be seen, hence
-    nothing is compared. 0 where the ellipsoid is not strictly in front of the camera.
+    All arguments are row by row: poses (m, 7), ellipsoids (m, 9) or NaN, boxes (m, 4) and flags of
+    their truncated edges (m, 4). The camera must have no mount. Regions beyond a truncated edge are
+    not compared, because they are outside the image. The IoU is 0 where the ellipsoid is not
+    strictly in front of the camera.
     """
     predicted, visible = _core.project_to_boxes(
         _core.PoseModel.SE3, camera, world_from_camera, ellipsoids

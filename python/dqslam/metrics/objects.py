@@ -1,4 +1,4 @@
-"""Objects against true ones: which is which, and how far off in place, size and orientation."""
+"""Objects against true ones: their matches, and errors of place, size and orientation."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,18 +8,18 @@ import numpy as np
 from dqslam._checks import Floats, Ints
 from dqslam.metrics.alignment import Alignment, same_shape
 
-# Axes that differ by less than this factor do not tell an orientation.
+# Axes whose lengths differ by less than this factor do not determine an orientation.
 NEAR_EQUAL = 1.2
 
 
 @dataclass(frozen=True, eq=False)
 class Matches:
-    """Which object is which true one; each occurs once at most."""
+    """Pairs of an object and a true object; each occurs at most once."""
 
     row: Ints
-    """Of the objects, ascending, shape (k,)."""
+    """Rows of the objects, ascending, shape (k,)."""
     true_row: Ints
-    """Of the true ones, shape (k,)."""
+    """Rows of the true objects, shape (k,)."""
 
 
 def match_by_id(ids: Ints, true_ids: Ints) -> Matches:
@@ -36,16 +36,17 @@ def match_nearest(
     true_class_names: Sequence[str] | None,
     gates: Floats,
 ) -> Matches:
-    """Match as many objects as can be, and of those choices the one of the least total distance.
+    """Match as many objects as possible, with the least total distance.
 
     Parameters
     ----------
     centers, true_centers
-        In the same world, meters, shapes (o, 3) and (t, 3).
+        Centers in the same world, meters, shapes (o, 3) and (t, 3).
     class_names, true_class_names
-        A pair has one class, but for case and blanks around; None: classes do not matter.
+        Both objects of a pair have the same class, except for case and surrounding blanks; None
+        if classes do not matter.
     gates
-        How far from each true object a match may be, meters, shape (t,).
+        The largest distance of a match from each true object, meters, shape (t,).
     """
     from scipy.optimize import linear_sum_assignment
 
@@ -57,7 +58,7 @@ def match_nearest(
             for given in (class_names, true_class_names)
         )
         allowed &= names[:, None] == true_names[None]
-    # A pair that is not allowed costs more than all that are.
+    # A pair that is not allowed costs more than all allowed pairs together.
     forbidden = 1.0 + float(distance[allowed].sum())
     row, true_row = linear_sum_assignment(np.where(allowed, distance, forbidden))
     good = allowed[row, true_row]
@@ -67,7 +68,8 @@ def match_nearest(
 def center_errors(centers: Floats, true_centers: Floats, alignment: Alignment) -> Floats:
     """Return the distance [m] of each object's center from the true one after an alignment.
 
-    Both of shape (o, 3), row by row; the alignment usually comes from the trajectory. Shape (o,).
+    Both have shape (o, 3), the result has shape (o,). The alignment usually comes from the
+    trajectory.
     """
     centers, true_centers = same_shape(centers, true_centers)
     return np.asarray(np.linalg.norm(alignment.apply(centers) - true_centers, axis=1))
@@ -84,17 +86,17 @@ def orientation_error(
 ) -> float:
     """Return the angle [deg] between the principal axes of two ellipsoids; NaN where free.
 
-    Axes are paired by length, which leaves of the 24 ways to name the axes of an ellipsoid the 4
-    that differ in signs; the error is the least of theirs. Where the truth has two axes whose
-    lengths differ by less than ``NEAR_EQUAL``, the turn about the third is free and the error is
-    the angle between the third ones; if each is that near to the next, there is no orientation.
+    Axes are paired by length. Of the 24 ways to name the axes of an ellipsoid, this leaves 4 that
+    differ in signs; the error is the least of these. If the truth has two axes whose lengths differ
+    by less than ``NEAR_EQUAL``, the rotation about the third axis is free and the error is the
+    angle between the third axes. If all axes are as close as that, there is no orientation.
 
     Parameters
     ----------
     rotation, true_rotation
         world_from_object, columns are the axes, shape (3, 3).
     semi_axes, true_semi_axes
-        Their lengths, meters, shape (3,).
+        Lengths of the axes, meters, shape (3,).
     """
     from scipy.spatial.transform import Rotation
 

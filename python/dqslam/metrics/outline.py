@@ -46,7 +46,7 @@ def visible_outlines(
 def through_lens(camera: _core.Camera, outlines: Floats) -> Floats:
     """Return outlines (..., 2) in the pixels of the image as recorded, which the lens distorts.
 
-    NaN well outside of the image, where the polynomials of the lens mean nothing.
+    They are NaN well outside of the image, where the polynomials of the lens are not valid.
     """
     if not camera.has_distortion:
         return outlines

@@ -1,4 +1,4 @@
-"""Errors of an estimate against a simulation's truth, object by object id, without alignment."""
+"""Errors of an estimate against a simulation's truth, with objects matched by id and unaligned."""
 
 from dataclasses import dataclass
 
@@ -21,17 +21,17 @@ class Report:
     rmse_pos: float
     """Mean distance of the poses from their true places, meters."""
     odometry_rmse_pos: float
-    """The same for odometry alone, meters."""
+    """Mean distance of the odometry's poses from their true places, meters."""
     rmse_landmark: float
     """Mean distance of the mapped objects' centers from their true places, meters."""
     rmse_volume: float
-    """Mean absolute error of the mapped objects' volumes, cubic meters; of the paper's volume."""
+    """Mean absolute error of the mapped objects' volumes as in the paper, cubic meters."""
     mapped: int
-    """Objects of the estimate."""
+    """Number of objects in the estimate."""
     not_ellipsoids: int
-    """Mapped objects whose dual quadric is no ellipsoid."""
+    """Number of mapped objects whose dual quadric is not an ellipsoid."""
     volume_relative_errors: tuple[float, ...] = ()
-    """|error| / truth of our own volume of each mapped object that is an ellipsoid."""
+    """|error| / truth of our own estimate of volume, for each mapped ellipsoid."""
 
     def __str__(self) -> str:
         """Show one line per error."""
@@ -76,9 +76,9 @@ def evaluate(estimate: Estimate, truth: Truth) -> Report:
 
 
 def position_error(pose_model: PoseModel, poses: Floats, true_poses: Floats) -> float:
-    """Return RMSE_pos: the mean distance [m] between poses, on the plane for SE(2); no alignment.
+    """Return RMSE_pos: the mean distance [m] between poses, on the plane for SE(2), unaligned.
 
-    Both of shape (n, d).
+    Both have shape (n, d).
     """
     axes = 2 if pose_model == PoseModel.SE2 else 3
     return mean_distance(np.asarray(poses)[:, :axes], np.asarray(true_poses)[:, :axes])
@@ -93,9 +93,9 @@ def mean_distance(points: Floats, true_points: Floats) -> float:
 def cube_volumes(shapes: Floats) -> Floats:
     """Return the paper's volume [m^3] of each quadric, from shapes S [m^2] of shape (o, 3, 3).
 
-    It is that of the cube whose side is the smallest full axis, 2 sqrt(smallest eigenvalue of S).
-    A quadric that is no ellipsoid has negative eigenvalues and no such axis; as the paper gives no
-    rule for it, the square root of the absolute value stands in, so that it counts.
+    It is the volume of the cube whose side is the smallest full axis, 2 sqrt(smallest eigenvalue of
+    S). A quadric that is not an ellipsoid has negative eigenvalues and no such axis. The paper
+    gives no rule for it; here it counts with the square root of the absolute value.
     """
     smallest = np.linalg.eigvalsh(shapes)[:, 0]
     return np.asarray((2.0 * np.sqrt(np.abs(smallest))) ** 3)
@@ -109,10 +109,11 @@ def ellipsoid_volumes(shapes: Floats) -> Floats:
 def box_volumes(shapes: Floats) -> Floats:
     """Return the volume [m^3] of the upright box-shaped object that each ellipsoid was fitted to.
 
-    From shapes S [m^2] of shape (o, 3, 3), in a world whose z axis is up. An upright box of ground
-    l x w, seen from all around, is (l + w) / pi half as wide in the mean, and so is the ellipsoid
-    that has the same outlines: its horizontal semi-axes are 4 / pi times the half sides (l = w),
-    or the geometric mean of both nearly so. Its height is the box's own, 2 sqrt(S_zz).
+    Shapes S [m^2] have shape (o, 3, 3), and the z axis of the world is up. An upright box with
+    ground l x w, seen from all around, has a mean half width of (l + w) / pi. The ellipsoid with
+    the same outlines has this half width too. For l = w its horizontal semi-axes are so 4 / pi
+    times the half sides, and otherwise this is nearly true of their geometric mean. Its height is
+    that of the box, 2 sqrt(S_zz).
     """
     across = np.sqrt(np.linalg.det(shapes[:, :2, :2]))  # product of the ground's semi-axes
     return np.asarray(8.0 * (np.pi / 4.0) ** 2 * across * np.sqrt(shapes[:, 2, 2]))

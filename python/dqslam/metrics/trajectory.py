@@ -14,10 +14,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Statistics:
-    """Of errors, in their unit."""
+    """Statistics of errors, in the unit of the errors."""
 
     rmse: float
-    """Root of the mean square."""
+    """Root mean square."""
     mean: float
     median: float
     max: float
@@ -39,11 +39,11 @@ class TrajectoryError:
 
     mean: float
     rmse: float
-    """Root of the mean square: what most tools call the absolute trajectory error."""
+    """Root mean square, which most tools call the absolute trajectory error."""
     median: float
     max: float
     alignment: Alignment
-    """true_from_estimated, in three dimensions whatever the kind of alignment."""
+    """The motion true_from_estimated, in three dimensions for every kind of alignment."""
 
     def __str__(self) -> str:
         """Show all on one line."""
@@ -58,7 +58,7 @@ def absolute_trajectory_error(
 ) -> TrajectoryError:
     """Compare positions with true ones, shape (n, 3) [m], row by row.
 
-    The best motion of the kind ``align`` is removed first: see ``align_positions``.
+    The best motion of the kind ``align`` is removed first, see ``align_positions``.
     """
     alignment = align_positions(positions, true_positions, align)
     positions, true_positions = same_shape(positions, true_positions)
@@ -72,9 +72,9 @@ class RelativePoseError:
 
     pairs: int
     translation: Statistics
-    """Meters."""
+    """Errors of the translation, meters."""
     rotation_deg: Statistics
-    """Degrees."""
+    """Errors of the rotation, degrees."""
 
 
 def relative_pose_error(
@@ -87,22 +87,22 @@ def relative_pose_error(
 ) -> RelativePoseError:
     """Compare the motions over a distance: (Q_i^-1 Q_j)^-1 (P_i^-1 P_j), Q true, P estimated.
 
-    Whatever rigid motion lies between the two worlds does not matter.
+    A rigid motion between the two worlds has no effect.
 
     Parameters
     ----------
     poses, true_poses
         world_from_camera, shape (n, 7), row by row.
     delta, unit
-        j is ``delta`` frames after i, or the first pose until which the true path has become
-        ``delta`` meters longer.
+        j is ``delta`` frames after i, or the first pose at which the true path is ``delta``
+        meters longer.
     all_pairs
-        Start at every pose; otherwise each pair starts where the one before ends.
+        Whether a pair starts at every pose; otherwise each starts where the one before ends.
 
     Raises
     ------
     ValueError
-        When the trajectory is too short for one pair.
+        If the trajectory is too short for one pair.
     """
     poses = as_floats("poses", poses, [None, 7])
     true_poses = as_floats("true poses", true_poses, [None, 7])
@@ -112,7 +112,7 @@ def relative_pose_error(
         raise ValueError(f"relative pose error: no two poses are {delta:g} {unit} apart")
     step, turn = _motion(poses, first, last)
     true_step, true_turn = _motion(true_poses, first, last)
-    distance = np.linalg.norm(step - true_step, axis=1)  # the turn of the error changes no length
+    distance = np.linalg.norm(step - true_step, axis=1)  # a rotation changes no length
     angle = np.degrees((true_turn.inv() * turn).magnitude())
     return RelativePoseError(len(first), statistics(distance), statistics(angle))
 

@@ -1,10 +1,10 @@
-"""Which way is up."""
+"""The upward direction of a world."""
 
 import numpy as np
 
 from dqslam._checks import Floats
 
-# Of the second term below: decides only where cameras never turn aside.
+# The weight of the second term below. It matters only where cameras never turn sideways.
 _MEAN_WEIGHT = 0.03
 _NEARLY = np.cos(np.radians(10.0))
 
@@ -12,9 +12,9 @@ _NEARLY = np.cos(np.radians(10.0))
 def up_direction(world_from_camera: Floats) -> Floats:
     """Return the unit vector (3,) that is up in the world of poses (n, 7), held without roll.
 
-    Then the x axes r of the cameras are level, however these are tilted: up is the u that minimizes
-    mean (r.u)^2 - w (m.u)^2, m being the mean of the directions that are up in the images. An axis
-    of the world that is less than 10 degrees off stands for it.
+    Without roll, the x axes r of the cameras are level for any tilt. Up is therefore the u that
+    minimizes mean (r.u)^2 - w (m.u)^2, where m is the mean of the directions that are up in the
+    images. If an axis of the world is less than 10 degrees off, that axis is returned.
     """
     from scipy.spatial.transform import Rotation
 

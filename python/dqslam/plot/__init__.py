@@ -1,4 +1,4 @@
-"""Figures. Nothing here computes results: the numbers come from the layers below."""
+"""Figures. Nothing here computes results; the numbers come from the layers below."""
 
 from dqslam.plot.maps import plot_maps as plot_maps
 from dqslam.plot.results import Drawn as Drawn

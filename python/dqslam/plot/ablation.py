@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 _DPI = 110
 _KIND_STYLES = {"random": (BLUE, "o"), "structured": (VERMILLION, "s")}
-_WORST_SHOWN = 100.0  # error over bound
+_WORST_SHOWN = 100.0  # the largest error over bound that has a color of its own
 
 
 def plot_ablation(table: AblationTable, path: str | Path) -> None:

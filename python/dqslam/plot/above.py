@@ -1,4 +1,4 @@
-"""The view from above: any world on paper, its longer side across."""
+"""The view from above: any world on paper, with its longer side across."""
 
 from dataclasses import dataclass
 
@@ -16,14 +16,14 @@ class FromAbove:
     """A projection along the vertical."""
 
     axes: Floats
-    """What runs to the right, and what up the paper, in the world; shape (2, 3)."""
+    """The directions in the world that point to the right and up on the paper, shape (2, 3)."""
     labels: tuple[str, str]
-    """Of both."""
+    """Labels of both axes."""
     downward: bool
-    """Whether the second one runs down the paper instead: numbers stay those of the world."""
+    """Whether the second axis runs down the paper, so that its numbers are those of the world."""
 
     def points(self, points: Floats) -> Floats:
-        """Return places on the paper, shape (n, 2), of points (n, 3)."""
+        """Return the places (n, 2) of points (n, 3) on the paper."""
         return np.asarray(points @ self.axes.T)
 
     def outline(self, center: Floats, shape: Floats) -> Floats:
@@ -38,7 +38,7 @@ def outline(center: Floats, shape: Floats) -> Floats:
 
 
 def from_above(world_from_camera: Floats) -> FromAbove:
-    """Choose the view of a path (n, 7): an axis of the world across, where one is vertical."""
+    """Choose the view of a path (n, 7), with an axis of the world across if one is vertical."""
     up = up_direction(world_from_camera)
     vertical = int(np.argmax(np.abs(up)))
     if np.abs(up[vertical]) == 1.0:

@@ -1,4 +1,4 @@
-"""Boxes detected and re-projected, in the frames that fit worst and as usual."""
+"""Detected and re-projected boxes, in the frame that fits worst and in the median frame."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -21,15 +21,15 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_AROUND = 0.03  # of the image, on each side
-_TALLEST = 3.0  # inches of one image
+_AROUND = 0.03  # margin on each side, share of the image
+_TALLEST = 3.0  # largest height of an image, inches
 
 
 def draw_worst_and_median(results: Results, fits: BoxFits) -> "Figure":
     """Draw the frame whose boxes overlap least with their objects on average, and the median one.
 
-    Solid the boxes as detected, dashed the boxes of the ellipsoids, whose outlines are thin. Pixels
-    are undistorted.
+    Detected boxes are solid, boxes of the ellipsoids are dashed, and outlines of the ellipsoids are
+    thin. Pixels are undistorted.
     """
     poses, overlaps = fits.frames()
     if not len(poses):

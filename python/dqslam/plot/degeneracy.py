@@ -23,7 +23,7 @@ _DPI = 110
 _MOTION_COLORS = (BLUE, ORANGE, GREEN, PURPLE)
 _ESTIMATOR_COLORS = {"paper": VERMILLION, "dqslam": BLUE}
 _START_MARKERS = {"SVD": "s", "identity": "D", "sphere": "o"}
-_ZERO = 1e-9  # what is exactly zero but for rounding is drawn here
+_ZERO = 1e-9  # values that are zero except for rounding are drawn here
 
 
 def plot_degeneracy(table: DegeneracyTable, path: str | Path) -> None:
@@ -68,7 +68,7 @@ def _draw_errors(axes: "Axes", table: DegeneracyTable) -> None:
             label=f"{estimator}, {start} start",
         )
     axes.set_yscale("log")
-    axes.set_ylim(top=1e8)  # what is further off is lost, however far
+    axes.set_ylim(top=1e8)  # larger errors all mean that the object is lost
     axes.set_xticks(range(len(names)), [name.replace(", ", ",\n") for name in names])
     axes.set_ylabel("error of the object's center [m]")
     axes.set_title(f"Median and quartiles of {table.trials} objects, poses known", fontsize=10)

@@ -1,4 +1,4 @@
-"""Errors of the poses over time, with the band that the estimate claims."""
+"""Errors of the poses over time, with the uncertainty of the estimate."""
 
 from typing import TYPE_CHECKING, Literal
 
@@ -28,8 +28,8 @@ _NOTHING = 1e-9  # a planar robot has no error along the vertical
 def draw_errors(errors: PoseErrors, kind: Literal["position", "rotation"]) -> "Figure":
     """Draw the errors along each axis of the true world, and the band of 3 sigma around zero.
 
-    Of positions [m] also the distance from the truth after alignment, beside that of the odometry.
-    Rotations are in degrees. An axis along which nothing can differ is left out.
+    For positions [m], also draw the distance from the truth after alignment, and that of the
+    odometry. Rotations are in degrees. An axis without any possible error is left out.
     """
     seconds = errors.timestamps - errors.timestamps[0]
     values, sigmas = errors.position, errors.position_sigma

@@ -1,4 +1,4 @@
-"""What one pose sees: boxes, and objects as the map has them."""
+"""The view of one pose: its boxes, and the objects of the map."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -27,10 +27,10 @@ def draw_boxes(
     linewidth: float,
     unmapped: str = GRAY,
 ) -> Ints:
-    """Draw what the detector saw from a pose, and return the rows of the objects that it shows.
+    """Draw the detected boxes of a pose, and return the rows of their objects.
 
-    ``lens`` says that the pixels are those of the image as recorded; ``unmapped`` is the color of
-    boxes of no object of the map. Those held out are dotted.
+    With ``lens`` the pixels are those of the image as recorded. ``unmapped`` is the color of boxes
+    without an object in the map. Boxes that were held out are dotted.
     """
     rows = np.flatnonzero(fits.boxes.pose == pose)
     boxes = fits.boxes.box[rows]
@@ -51,6 +51,6 @@ def draw_boxes(
 
 
 def rectangle(box: Floats) -> Floats:
-    """Return the corners (2, 5) of a box, the first again at the end."""
+    """Return the corners (2, 5) of a box, with the first repeated at the end."""
     u_min, v_min, u_max, v_max = box
     return np.array([[u_min, u_max, u_max, u_min, u_min], [v_min, v_min, v_max, v_max, v_min]])

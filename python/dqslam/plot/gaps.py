@@ -1,10 +1,10 @@
-"""Lines that do not run where nothing is known."""
+"""Lines that are interrupted where data are missing."""
 
 import numpy as np
 
 from dqslam._checks import Floats
 
-_GAP = 5.0  # times the usual interval
+_GAP = 5.0  # a longer interval than this multiple of the usual one is a gap
 
 
 def break_at_gaps(timestamps: Floats, values: Floats) -> tuple[Floats, Floats]:

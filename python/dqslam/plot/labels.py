@@ -1,4 +1,4 @@
-"""Names beside what they name, where there is room."""
+"""Labels beside outlines, where there is room."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -11,9 +11,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _DIRECTIONS = np.array([(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)])
-_DISTANCES = (3.0, 8.0, 14.0, 22.0)  # points from the edge of the named
+_DISTANCES = (3.0, 8.0, 14.0, 22.0)  # distances from the outline, in points
 _LEADER_FROM = 8.0
-_APART = 0.8  # points around a text
+_APART = 0.8  # free space around a text, in points
 
 
 def place_labels(
@@ -24,10 +24,10 @@ def place_labels(
     *,
     size: float,
 ) -> int:
-    """Write a text beside each outline (2, n), so that none covers another; return how many.
+    """Write a text beside each outline (2, n), so that none covers another; return their number.
 
-    The nearest of a few free places is taken, a far one with a line of the outline's color. What
-    finds no room has no name. Limits and size of the axes must be final.
+    Each text gets the nearest of a few free places; a far one has a line in the outline's color. An
+    outline without a free place gets no text. Limits and size of the axes must be final.
     """
     from matplotlib.patheffects import withStroke
 
@@ -58,7 +58,7 @@ def place_labels(
             ha="center",
             va="center",
             color="0.15",
-            bbox={"pad": 0.5, "facecolor": "none", "linewidth": 0.0},  # where the line ends
+            bbox={"pad": 0.5, "facecolor": "none", "linewidth": 0.0},  # the end of the line
             arrowprops=line if distance >= _LEADER_FROM else None,
             zorder=6,
             path_effects=[withStroke(linewidth=1.2, foreground="white")],
@@ -97,6 +97,6 @@ def _bounds(points: Floats) -> Floats:
 
 
 def _overlaps(box: Floats, others: Floats) -> Bools:
-    """Return whether a box (4,) meets others (m, 4), a point being a box too."""
+    """Return whether a box (4,) overlaps others (m, 4), which may be points."""
     low, high = np.maximum(box[:2], others[:, :2]), np.minimum(box[2:], others[:, 2:])
     return np.asarray((high >= low).all(axis=1))

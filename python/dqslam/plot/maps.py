@@ -18,16 +18,16 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _COLUMNS = 3
-_AROUND_M = 8.0  # shown around the truth at most: what has diverged must not shrink the rest
+_AROUND_M = 8.0  # largest margin around the truth, so that no diverged estimate shrinks it
 _PANEL_INCHES = 4.2
 _DPI = 150
 
 
 def plot_maps(maps: Sequence[tuple[str, Estimate, Truth]], path: str | Path) -> None:
-    """Draw maps of (title, estimate, truth) side by side, all alike in scale, into an image file.
+    """Draw maps of (title, estimate, truth) side by side, at the same scale, into an image file.
 
-    Trajectories are lines, objects their outlines from above. A true object that is no ellipsoid
-    is a disc of its volume, a mapped one that is none a cross.
+    Trajectories are lines, and objects are outlines from above. A true object that is not an
+    ellipsoid is a disc of its volume; a mapped object that is not an ellipsoid is a cross.
     """
     if not maps:
         raise ValueError("there are no maps to draw")
@@ -53,7 +53,7 @@ def plot_maps(maps: Sequence[tuple[str, Estimate, Truth]], path: str | Path) -> 
 
 
 def _window(maps: Sequence[tuple[str, Estimate, Truth]]) -> tuple[Floats, Floats]:
-    """Return the corners (2,) of what is shown: all of the truth, and what stays near it."""
+    """Return the corners (2,) of the window, which shows all of the truth and what is near it."""
     lows, highs = [], []
     for _, estimate, truth in maps:
         low, high = truth.poses[:, :2].min(axis=0), truth.poses[:, :2].max(axis=0)

@@ -20,17 +20,17 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 VIDEOS = (".mp4", ".gif")
-_DPI = 100  # of the figure: an inch is so many pixels of the image
-_RATES = (1.0, 60.0)  # frames a second that can be watched
+_DPI = 100  # pixels of the image in an inch of the figure
+_RATES = (1.0, 60.0)  # frame rates that can be watched, Hz
 _USUAL_RATE = 10.0
 _UNSEEN = (0, (3, 2))
 
 
 class Overlay:
-    """One image at a time, with what the map says of it.
+    """One image at a time, with the objects of the map.
 
-    Thick and named are the outlines of the ellipsoids that have a box in the image; those of the
-    others are dashed, as something may hide them. Thin are the boxes, white those of no object.
+    Outlines of ellipsoids with a box in the image are thick and have a name. The others are dashed,
+    because they may be occluded. Boxes are thin; those without an object are white.
     """
 
     def __init__(self, results: Results) -> None:
@@ -39,13 +39,13 @@ class Overlay:
         self._fits = None if results.boxes is None else fit_boxes(results)
         self._styles = class_styles(results.objects.class_names)
         camera = results.camera
-        self._scale = max(camera.height / 480.0, 0.5)  # lines and names grow with the image
+        self._scale = max(camera.height / 480.0, 0.5)  # lines and names scale with the image
         self.figure = new_figure(camera.width / _DPI, camera.height / _DPI)
         self.figure.set_layout_engine("none")
         self._axes = self.figure.add_axes((0.0, 0.0, 1.0, 1.0))
 
     def draw(self, pose: int, image: Path) -> "Figure":
-        """Draw an image and the objects as seen from a pose; FileError if it is none of those."""
+        """Draw an image and the objects from a pose; FileError if it is not such an image."""
         pixels = read_image(image)
         camera, axes = self._results.camera, self._axes
         height, width = pixels.shape[:2]
@@ -56,7 +56,7 @@ class Overlay:
             )
         axes.clear()
         axes.set_axis_off()
-        # Gray as it is, not stretched over what occurs: floats are shares, integers bytes.
+        # Gray values are drawn unscaled: floats from 0 to 1, integers from 0 to 255.
         white = 1.0 if pixels.dtype.kind == "f" else float(np.iinfo(pixels.dtype).max)
         axes.imshow(
             pixels, cmap="gray", vmin=0.0, vmax=white, interpolation="nearest", aspect="auto"
@@ -102,7 +102,7 @@ class Overlay:
             )
 
     def _write_name(self, axes: "Axes", name: str, outline: Floats, color: str) -> None:
-        """Write a name above an outline, or as near to that as the image goes."""
+        """Write a name above an outline, or as near to that as possible within the image."""
         camera, size = self._results.camera, 6.5 * self._scale
         half = 0.33 * len(name) * size * _DPI / 72.0
         low, high = np.nanmin(outline, axis=0), np.nanmax(outline, axis=0)
@@ -126,7 +126,7 @@ def read_image(path: Path) -> Any:
 
     try:
         return imread(path)
-    except (OSError, ValueError, SyntaxError) as error:  # what Pillow raises for what is no image
+    except (OSError, ValueError, SyntaxError) as error:  # Pillow's errors for such a file
         raise FileError(path, f"cannot be read as an image: {error}") from None
 
 
@@ -164,7 +164,7 @@ def save_video(
     Raises
     ------
     FileError
-        For another suffix, for MP4 where there is no ffmpeg, or an image that cannot be read.
+        For another suffix, for MP4 without ffmpeg, or for an image that cannot be read.
     """
     check_video(path)
     if rate is None:
@@ -187,9 +187,9 @@ def check_video(path: Path) -> None:
 
 
 def usual_rate(timestamps: Floats) -> float:
-    """Return the frames a second at which poses of these times, (n,) s, are seen as they went by.
+    """Return the frame rate [Hz] that plays poses of these times, (n,) s, in real time.
 
-    10 where that could not be watched, as with time stamps that only count.
+    It is 10 Hz if real time cannot be watched, for example if time stamps only count.
     """
     if len(timestamps) < 2:
         return _USUAL_RATE
@@ -202,6 +202,6 @@ def _writer(suffix: str, rate: float) -> Any:
 
     if suffix == ".gif":
         return PillowWriter(fps=rate)  # type: ignore[arg-type]
-    # H.264 as browsers show it wants even sides.
+    # Browsers need H.264 with even sides.
     even = ["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p", "-loglevel", "error"]
     return FFMpegWriter(fps=rate, codec="libx264", extra_args=even)  # type: ignore[arg-type]

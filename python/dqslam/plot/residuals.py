@@ -1,4 +1,4 @@
-"""How well boxes fit: what is found beside what the noise model says."""
+"""How well boxes fit: residuals compared with the noise model."""
 
 from typing import TYPE_CHECKING
 
@@ -21,15 +21,15 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _EDGES = 4
-_GATE = 0.99  # of boxes that show their object lie below
+_GATE = 0.99  # share of the inliers below the line
 _LARGEST_CHI2, _LARGEST_SIGMA = 20.0, 5.0
 
 
 def draw_residuals(fits: BoxFits) -> "Figure":
     """Draw histograms of whole boxes against chi-square with 4 dof, of edges against a Gaussian.
 
-    What lies beyond either end is in the last bin, which is hatched. Boxes that were held out from
-    the estimator are a line apart.
+    Values beyond either end are in the last bin, which is hatched. Boxes that were held out from
+    the estimator have a line of their own.
     """
     from scipy.stats import chi2, norm
 

@@ -20,11 +20,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Drawn:
-    """What became of the figures."""
+    """The figures that were drawn, and those that were left out."""
 
     written: tuple[Path, ...]
     left_out: dict[str, str]
-    """Why, by the name of the figure."""
+    """The reason why a figure was left out, by its name."""
 
 
 def plot_results(
@@ -38,20 +38,19 @@ def plot_results(
     max_time_difference: float | None = None,
     progress: Callable[[float], None] = lambda share: None,
 ) -> Drawn:
-    """Draw all that the results allow into files of a kind, "svg", "png" or "pdf".
+    """Draw all figures that the results allow into files of a kind, "svg", "png" or "pdf".
 
-    ``map``, ``boxes``, ``residuals``, and with a true trajectory ``position_error`` and
-    ``rotation_error``: docs/plots.md says what each shows. Nothing is written unless
-    all can be drawn.
+    These are ``map``, ``boxes``, ``residuals``, and with a true trajectory ``position_error`` and
+    ``rotation_error``; docs/plots.md describes each. Nothing is written unless all can be drawn.
 
     Parameters
     ----------
     groundtruth, objects
-        What is true, in any world, as for ``evaluate_results``.
+        The truth, in any world, as for ``evaluate_results``.
     align, max_time_difference
-        As there.
+        As for ``evaluate_results``.
     progress
-        Told the share of the files that is written.
+        Called with the share of the files that has been written.
     """
     figures: dict[str, Figure] = {}
     left_out: dict[str, str] = {}

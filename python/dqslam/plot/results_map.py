@@ -29,12 +29,12 @@ if TYPE_CHECKING:
 
 _SIGMAS = 2.0
 _POSE_ELLIPSES = 12
-_NAMED_BY_CLASS = 12  # where there are more objects, they are numbers, and the legend has classes
-_WIDTH = 2.8  # inches of the map
-_RATIOS = (0.35, 1.35)  # of its height to its width, at least and at most
+_NAMED_BY_CLASS = 12  # with more objects, labels are numbers, and the legend has the classes
+_WIDTH = 2.8  # width of the map, inches
+_RATIOS = (0.35, 1.35)  # least and largest ratio of its height to its width
 _LEGEND_COLUMNS = 4
-_MARGIN = 0.06  # of the size, around
-_LOST = 0.5  # of the size: what odometry and objects may add to each side of the paths
+_MARGIN = 0.06  # margin, share of the size
+_LOST = 0.5  # largest share of the size that odometry and objects add to each side of the paths
 _ODOMETRY_PATH: dict[str, Any] = {"color": ODOMETRY, "linewidth": 0.8, "label": "odometry"}
 _ESTIMATED_PATH: dict[str, Any] = {"color": ESTIMATE, "linewidth": 0.9, "label": "estimate"}
 _TRUE_PATH: dict[str, Any] = {"color": TRUTH, "linewidth": 2.4, "alpha": 0.5, "label": "truth"}
@@ -42,10 +42,10 @@ _TRUE_PATH: dict[str, Any] = {"color": TRUTH, "linewidth": 2.4, "alpha": 0.5, "l
 
 @dataclass(frozen=True, eq=False)
 class MapTruth:
-    """What is true, in its own world, and how the estimate gets there."""
+    """The truth in its own world, and the motion that brings the estimate there."""
 
     timestamps: Floats
-    """Of the poses, seconds, shape (n,)."""
+    """Times of the poses, seconds, shape (n,)."""
     world_from_camera: Floats
     """True poses, shape (n, 7)."""
     objects: TrueObjects | None
@@ -56,8 +56,9 @@ class MapTruth:
 def draw_results_map(results: Results, truth: MapTruth | None = None) -> "Figure":
     """Draw odometry, estimate, objects by class, uncertainty of 2 sigma, and the truth if known.
 
-    With the truth all is in its world: odometry and estimate are moved alike. Objects are outlines
-    from above, dotted the covariance of their centers; one that is no ellipsoid is a cross.
+    With a truth everything is in its world, and odometry and estimate are moved by the same motion.
+    Objects are outlines from above, and covariances of their centers are dotted; an object that is
+    not an ellipsoid is a cross.
     """
     move = Alignment(np.eye(3), np.zeros(3)) if truth is None else truth.alignment
     estimate, odometry = (
@@ -102,7 +103,7 @@ def draw_results_map(results: Results, truth: MapTruth | None = None) -> "Figure
 
 
 def _window(paths: list[Floats], others: list[Floats]) -> tuple[Floats, Floats]:
-    """Return the corners (2,) of what is shown: the paths, and what is not far from them."""
+    """Return the corners (2,) of the window, which shows the paths and what is near them."""
     every = np.vstack(paths)
     low, high = every.min(axis=0), every.max(axis=0)
     beyond = _LOST * max(float((high - low).max()), 1e-3)
@@ -136,7 +137,7 @@ def _outlines(view: FromAbove, objects: MapObjects, move: Alignment) -> list[Flo
 
 
 def _true_outlines(view: FromAbove, objects: TrueObjects | None) -> list[Floats]:
-    """Return what is known of true objects: the inscribed ellipsoid, or nothing of its size."""
+    """Return the inscribed ellipsoids of true objects; those without a size are points."""
     if objects is None or objects.size is None:
         return []
     turns = np.tile(np.eye(3), (len(objects), 1, 1))
@@ -249,7 +250,7 @@ def _draw_legend(
 
 
 def _names(objects: MapObjects) -> list[str]:
-    """Return what is written beside each object: its class, and its id where that is not enough."""
+    """Return the label of each object: its class, and its id if the class is not unique."""
     if len(objects) > _NAMED_BY_CLASS:
         return [str(number) for number in objects.object_ids]
     count = Counter(objects.class_names)

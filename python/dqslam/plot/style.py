@@ -1,4 +1,4 @@
-"""How all figures look: colors that the color-blind can tell apart, sizes, files."""
+"""The style of all figures: colors that the color-blind can distinguish, sizes, files."""
 
 import contextlib
 from collections import Counter
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.figure import Figure
 
-# Of classes: first those that no path has.
+# Colors of classes; the first ones are not used for paths.
 _CLASS_COLORS = (PURPLE, ORANGE, SKY, GREEN, BLUE, VERMILLION, YELLOW)
 _CLASS_LINES = ("-", (0, (4, 1)), (0, (1.5, 0.8)))
 
@@ -43,15 +43,15 @@ _RC = {
     "xtick.major.width": 0.6,
     "ytick.major.width": 0.6,
     "lines.linewidth": 1.0,
-    "pdf.fonttype": 42,  # text stays text
-    "svg.hashsalt": "dqslam",  # the same figure is the same file
+    "pdf.fonttype": 42,  # keeps text as text
+    "svg.hashsalt": "dqslam",  # makes files reproducible
 }
 _NO_DATE = {"svg": {"Date": None}, "pdf": {"CreationDate": None}, "png": None}
 
 
 @contextlib.contextmanager
 def column_style() -> Iterator[None]:
-    """Draw and save in the sizes of a column of text."""
+    """Draw and save figures with the sizes for a column of text."""
     from matplotlib import rc_context
 
     with rc_context(_RC):  # type: ignore[arg-type]
@@ -59,7 +59,7 @@ def column_style() -> Iterator[None]:
 
 
 def new_figure(width: float, height: float) -> "Figure":
-    """Return an empty figure of a size in inches, that no window shows."""
+    """Return an empty figure of a size in inches, without a window."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -69,7 +69,7 @@ def new_figure(width: float, height: float) -> "Figure":
 
 
 def class_styles(class_names: Iterable[str]) -> dict[str, dict[str, Any]]:
-    """Return color and line style of each class; names are one per object, frequent ones first."""
+    """Return color and line style of each class, frequent ones first; names are one per object."""
     styles: dict[str, dict[str, Any]] = {}
     for place, (name, _) in enumerate(Counter(class_names).most_common()):
         turn, color = divmod(place, len(_CLASS_COLORS))
@@ -92,7 +92,7 @@ def legend_above(figure: "Figure", handles: "Sequence[Artist]") -> None:
 
 
 def save_figure(figure: "Figure", path: str | Path, *, dpi: float = _DPI) -> None:
-    """Write a figure, whole or not at all, in the format that its suffix names."""
+    """Write a figure, whole or not at all, in the format of its suffix."""
     path = Path(path)
     kind = path.suffix.lstrip(".").lower()
     if kind not in FORMATS:

@@ -1,4 +1,4 @@
-"""What a sweep shows: a metric against the setting that was varied, with confidence intervals."""
+"""Figures of a sweep: metrics against a varied setting, with confidence intervals."""
 
 from __future__ import annotations
 
@@ -30,21 +30,21 @@ if TYPE_CHECKING:
 SUMMARY = "summary.json"
 _COLORS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY)
 _MARKERS = "os^Dvp"
-_LOG_FROM = 20.0  # times the least: so wide a range is drawn in decades
+_LOG_FROM = 20.0  # a range up to this multiple of its least value is linear, a wider one in decades
 _MOST_SERIES = 6
-_APART = 0.012  # of the axis, between the points of two series
-# What is drawn, as far as it was measured; else the first two metrics.
+_APART = 0.012  # share of the axis between the points of two series
+# The metrics that are drawn, as far as they were measured; else the first two.
 _SHOWN = {"rmse_pos": "positions", "rmse_landmark": "centers"}
 
 
 @dataclass(frozen=True)
 class _Places:
-    """Where the values of a parameter lie along the axis: numbers, or names side by side."""
+    """The places of a parameter's values on the axis: numbers, or names side by side."""
 
     names: list[str] | None
     in_decades: bool
     span: float
-    """Of the axis; of logarithms where it is in decades."""
+    """Length of the axis, in logarithms if it is in decades."""
     series: int
 
     @classmethod
@@ -57,7 +57,7 @@ class _Places:
         return cls(None, in_decades, np.log(high / low) if in_decades else high - low, series)
 
     def at(self, values: list[Any], number: int) -> Floats:
-        """Return where values of one of the series are drawn, beside those of the others."""
+        """Return the places for the values of a series, beside those of the other series."""
         shift = _APART * self.span * (number - (self.series - 1) / 2.0)
         if self.names is not None:
             return np.array([self.names.index(str(one)) for one in values]) + 4.0 * shift
@@ -83,10 +83,10 @@ def read_summary(folder: Path) -> dict[str, Any]:
 
 
 def draw_sweep(summary: dict[str, Any], parameter: str | None = None) -> Figure:
-    """Draw the median of each metric against a parameter, the first by default, a line a series.
+    """Draw the median of each metric against a parameter, by default the first, a line per series.
 
-    A series is all cells that are alike in the other parameters; more than six become one of points
-    alone. Bars are the confidence intervals of the medians.
+    A series has all cells that are equal in the other parameters. More than six series become a
+    single one of points. Bars are the confidence intervals of the medians.
 
     Raises
     ------
@@ -169,7 +169,7 @@ def _draw_metric(
 
 
 def _bounds(spread: dict[str, Any]) -> tuple[float, float]:
-    """Return the ends of the interval of the median, itself where there is none."""
+    """Return the ends of the interval of the median, or the median itself without one."""
     interval = spread["median_interval"]
     if interval is None:
         return spread["median"], spread["median"]

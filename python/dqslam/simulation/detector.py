@@ -1,4 +1,4 @@
-"""A simulated detector: which objects give a box, where it is cut, and whose id it carries."""
+"""A simulated detector: the objects that get a box, how it is cut, and the id that it has."""
 
 import numpy as np
 from numpy.random import Generator
@@ -9,7 +9,7 @@ from dqslam.simulation.scenario import DetectorSettings
 
 
 def cut_at_border(box: Floats, camera: Camera) -> tuple[Floats, Bools]:
-    """Cut boxes (..., 4) at the border of the image, and tell which of their edges that moved."""
+    """Cut boxes (..., 4) at the border of the image, and flag the edges that moved."""
     first = np.full(4, -0.5)
     last = np.array([camera.width, camera.height] * 2) - 0.5
     outside = (box < first) | (box > last)
@@ -17,10 +17,10 @@ def cut_at_border(box: Floats, camera: Camera) -> tuple[Floats, Bools]:
 
 
 def is_detected(box: Floats, camera: Camera, settings: DetectorSettings) -> Bools:
-    """Say which exact boxes (..., 4) give a detection; NaN gives none.
+    """Return which exact boxes (..., 4) are detected; NaN is not.
 
-    The longer side of what is inside of the image must exceed `min_side_px`; what is outside may
-    be nothing ("discard") or leave `min_visible_fraction` of the box's area ("clip").
+    The longer side of the part inside the image must exceed `min_side_px`. With "discard" the whole
+    box must be inside; with "clip" at least `min_visible_fraction` of its area must be.
     """
     inside, is_cut = cut_at_border(box, camera)
     size = inside[..., 2:] - inside[..., :2]
@@ -35,15 +35,15 @@ def is_detected(box: Floats, camera: Camera, settings: DetectorSettings) -> Bool
 def associate(
     pose: Ints, object_row: Ints, center: Floats, settings: DetectorSettings, random: Generator
 ) -> Ints:
-    """Return the object row that each detection (m,) is said to show, some of them wrong.
+    """Return the object row of each detection (m,), some of them wrong.
 
     Every pair of pose and object has its own random numbers, whether it was detected or not. A
-    wrong row is that of another detected object; where there is none, all are right.
+    wrong row is that of another detected object; if there is no other, all are right.
 
     Parameters
     ----------
     pose, object_row
-        What was detected, shape (m,).
+        Pose and object of each detection, shape (m,).
     center
         True centers of all objects, meters, shape (o, 3).
     """

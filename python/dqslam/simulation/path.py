@@ -1,4 +1,4 @@
-"""How the robot of a scenario moves, and what its odometry says of it."""
+"""The motion of the robot of a scenario, and its odometry."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -20,7 +20,7 @@ from dqslam.simulation.scenario import (
 )
 
 _UP = [0.0, 0.0, 1.0]
-_WAVES = (0.7, 1.7, 3.1)  # of the wobble per turn, of no common measure: no two turns are alike
+_WAVES = (0.7, 1.7, 3.1)  # waves of the wobble per turn, so that no two turns are equal
 
 
 class TruePath(NamedTuple):
@@ -29,7 +29,7 @@ class TruePath(NamedTuple):
     pose_model: PoseModel
     poses: Floats  # world_from_robot, (n, d)
     relative: Floats  # next_in_previous, (n - 1, d)
-    is_turn: Bools  # which steps turn, where that decides the noise of odometry; (n - 1,)
+    is_turn: Bools  # whether a step turns, if the noise of odometry depends on it; (n - 1,)
 
 
 def move(path: PathSettings, random: Generator) -> TruePath:
@@ -40,9 +40,9 @@ def move(path: PathSettings, random: Generator) -> TruePath:
 
 
 def _drive(path: RoundedRectangleSettings) -> TruePath:
-    """Drive by (v, 0, omega) a step: v forward, then a turn by omega.
+    """Drive by (v, 0, omega) in each step: v forward, then a turn by omega.
 
-    Straight parts have the whole number of steps that brings the rectangle nearest to its size.
+    Straight parts have the whole number of steps for which the rectangle is nearest to its size.
     """
     turn = np.full(path.turn_steps, np.pi / 2.0 / path.turn_steps)
     heading = np.cumsum(turn) - turn
@@ -59,7 +59,7 @@ def _drive(path: RoundedRectangleSettings) -> TruePath:
 
 
 def _orbit(path: OrbitSettings, random: Generator) -> TruePath:
-    """Go round the world's z axis, looking at the origin but for a hand's wobble."""
+    """Move around the world's z axis and look at the origin, except for a hand's wobble."""
     from scipy.spatial.transform import Rotation
 
     turn = np.linspace(0.0, path.turns, path.poses)
@@ -73,7 +73,7 @@ def _orbit(path: OrbitSettings, random: Generator) -> TruePath:
         for sigma in (path.roll_sigma_deg, path.pitch_sigma_deg, path.yaw_sigma_deg)
     )
     position = np.column_stack([distance * np.cos(around), distance * np.sin(around), height])
-    # Intrinsic: turn to the axis, tilt down to the origin, then roll. Forward is x, left is y.
+    # Intrinsic rotations: turn to the axis, tilt down to the origin, roll. Forward is x, left is y.
     down = np.arctan2(height, distance)
     angles = np.column_stack([around + np.pi + yaw, down + pitch, roll])
     poses = np.hstack([position, Rotation.from_euler("ZYX", angles).as_quat()])
@@ -89,7 +89,7 @@ def _wobble(turn: Floats, sigma: float, random: Generator) -> Floats:
 
 
 def measure_odometry(motion: TruePath, noise: OdometrySettings, random: Generator) -> Odometry:
-    """Add noise to the true motion and say how large it is."""
+    """Add noise to the true motion; return the odometry with its covariance."""
     if isinstance(noise, PlanarOdometrySettings):
         return _measure_planar(motion, noise, random)
     sigmas = (noise.translation_sigma_m, noise.rotation_sigma_rad)
@@ -137,7 +137,7 @@ def _measure_planar(motion: TruePath, noise: PlanarOdometrySettings, random: Gen
     if not noise.lateral_is_drawn:
         error[:, 1] = 0.0
     measured = motion.relative + error
-    # The error is along the axes of the previous pose; the covariance belongs to those of the next.
+    # The error is along the axes of the previous pose, the covariance along those of the next one.
     next_from_previous = Rotation.from_rotvec(np.outer(-measured[:, 2], _UP)).as_matrix()
     covariance = np.einsum("nij,nj,nkj->nik", next_from_previous, sigma**2, next_from_previous)
     return Odometry(PoseModel.SE2, motion.poses[0], measured, covariance)

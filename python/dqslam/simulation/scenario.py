@@ -1,7 +1,7 @@
 """Scenarios: the settings of a simulated world, read from TOML.
 
-The file is the only home of the settings; what has a default here is off by default. Names carry
-their unit.
+Settings are only in the file; a setting with a default here is off by default. Names include
+the unit.
 """
 
 from pathlib import Path
@@ -29,17 +29,17 @@ class RoundedRectangleSettings(_Settings):
     length_m: Positive
     width_m: Positive
     start_fraction: Annotated[float, Field(ge=0.0, le=1.0)]
-    """Where on the straight part of a long side the robot starts, and ends."""
+    """Place on the straight part of a long side where the robot starts and ends, from 0 to 1."""
     laps: Count
     step_m: Positive
     turn_steps: Count
-    """Steps over which each 90 degree turn is spread."""
+    """Number of steps of each 90 degree turn."""
     period_s: Positive
     """Time between two poses."""
 
 
 class OrbitSettings(_Settings):
-    """A hand-held way round the world's z axis, looking at the origin, counter-clockwise.
+    """A hand-held, counter-clockwise path around the world's z axis that looks at the origin.
 
     Sigmas are the root mean square of a slow, smooth wobble.
     """
@@ -48,10 +48,10 @@ class OrbitSettings(_Settings):
     turns: Positive
     poses: Annotated[int, Field(ge=2)]
     distance_m: Positive
-    """From the axis."""
+    """Distance from the axis."""
     distance_sigma_m: NotNegative
     height_m: float
-    """Above the plane z = 0."""
+    """Height above the plane z = 0."""
     height_sigma_m: NotNegative
     roll_sigma_deg: NotNegative
     pitch_sigma_deg: NotNegative
@@ -71,19 +71,19 @@ class CameraSettings(_Settings):
     width_px: Count
     height_px: Count
     heading_deg: float
-    """Of the optical axis, counter-clockwise from the robot's forward axis."""
+    """Heading of the optical axis, counter-clockwise from the robot's forward axis."""
     position_in_robot_m: tuple[float, float, float]
 
 
 class LogNormalSizeSettings(_Settings):
-    """Ellipsoids of any orientation that are just what a size prior believes.
+    """Ellipsoids of any orientation that are drawn from a size prior.
 
-    Half the logarithm of the shape S is log(median_m) I + log(spread) G, G symmetric and Gaussian,
-    of variance 1 on the diagonal and 1/2 beside it.
+    Half the logarithm of the shape S is log(median_m) I + log(spread) G, where G is symmetric and
+    Gaussian with variance 1 on the diagonal and 1/2 off it.
     """
 
     median_m: Positive
-    """Of the semi-axes' geometric mean."""
+    """Median of the geometric mean of the semi-axes."""
     spread: Annotated[float, Field(gt=1.0)]
 
 
@@ -93,9 +93,9 @@ class _ObjectSettings(_Settings):
     side_sigma_m: NotNegative
     side_min_m: Positive
     semi_axis_factor: tuple[Positive, Positive]
-    """Ellipsoids: semi-axis over half the side of the cube, uniform between these two."""
+    """For ellipsoids: semi-axis divided by half the side of the cube, uniform between these two."""
     log_normal_size: LogNormalSizeSettings | None = None
-    """Ellipsoids: drawn like this instead, whatever side and factor say."""
+    """For ellipsoids: sizes are drawn like this instead, and side and factor have no effect."""
 
     @model_validator(mode="after")
     def _factors_ascend(self) -> Self:
@@ -105,7 +105,7 @@ class _ObjectSettings(_Settings):
 
 
 class InsidePathSettings(_ObjectSettings):
-    """Objects, placed uniformly inside the path."""
+    """Objects that are placed uniformly inside the path."""
 
     kind: Literal["inside_path"]
     margin_m: NotNegative
@@ -114,13 +114,13 @@ class InsidePathSettings(_ObjectSettings):
 
 
 class OnTableSettings(_ObjectSettings):
-    """Objects, placed uniformly on or above a table top at z = 0 around the origin."""
+    """Objects that are placed uniformly on or above a table top at z = 0 around the origin."""
 
     kind: Literal["on_table"]
     length_m: Positive
-    """Along x, where the centers may be."""
+    """Length along x of the region of the centers."""
     width_m: Positive
-    """Along y, likewise."""
+    """Width along y of the region of the centers."""
     lift_max_m: NotNegative
     """The lowest point of an object is above the table by a height uniform from 0 to this."""
 
@@ -129,19 +129,19 @@ WorldSettings = InsidePathSettings | OnTableSettings
 
 
 class DetectorSettings(_Settings):
-    """When an object gives a box, how exact it is, and whose it is said to be."""
+    """The boxes of a detector: when an object gets one, its noise, and its id."""
 
     min_side_px: NotNegative
     """An object is detected when the longer side of its box exceeds this."""
     edge_sigma_px: NotNegative
     truncation: Literal["discard", "clip"] = "discard"
-    """What becomes of a box that leaves the image: none, or the part inside of the image."""
+    """Whether a box that leaves the image is discarded, or clipped to the part inside."""
     min_visible_fraction: Annotated[float, Field(gt=0.0, le=1.0)] = 0.3
-    """With "clip": the least part of the whole box's area that is inside of the image."""
+    """With "clip": the least share of the whole box's area that must be inside of the image."""
     wrong_associations: Annotated[float, Field(ge=0.0, le=0.4)] = 0.0
     """Share of the boxes that carry the id of another detected object."""
     wrong_association_kind: WrongAssociationKind = "random"
-    """Which one: any, or the one whose center is nearest ("structured")."""
+    """Which other object: any ("random"), or the one with the nearest center ("structured")."""
 
 
 class PlanarOdometrySettings(_Settings):
@@ -151,15 +151,15 @@ class PlanarOdometrySettings(_Settings):
     translation_sigma_m: Positive
     rotation_sigma_rad: Positive
     turn_rotation_sigma_rad: Positive
-    """On the steps of a turn."""
+    """Sigma of the rotation on the steps of a turn."""
     lateral_sigma_m: Positive
-    """What the covariance says of sideways motion, which (v, omega) has none of."""
+    """Sigma of sideways motion in the covariance; (v, omega) has no such motion."""
     lateral_is_drawn: bool = False
-    """Whether odometry errs sideways as its covariance says, or not at all."""
+    """Whether odometry has a sideways error with this sigma, or none at all."""
 
 
 class SpatialOdometrySettings(_Settings):
-    """Noise of the measured motion in space per step, per axis."""
+    """Noise of the measured motion in space, for each step and axis."""
 
     kind: Literal["spatial"]
     translation_sigma_m: Positive
@@ -173,14 +173,14 @@ class RelativePositionSettings(_Settings):
     """Noise of measured object centers, in the robot frame."""
 
     sigma_m: Positive
-    """Per axis."""
+    """Sigma of each axis."""
 
 
 class Scenario(_Settings):
-    """Everything that a simulated recording is made from, except the seed."""
+    """All settings of a simulated recording, except the seed."""
 
     name: str = "unnamed"
-    """When read from a file, that file's without its suffix."""
+    """Name of the scenario; if it was read from a file, the file's name without suffix."""
     objects: ObjectKind
     path: Annotated[PathSettings, Field(discriminator="kind")]
     camera: CameraSettings
@@ -202,12 +202,12 @@ class Scenario(_Settings):
 def load_scenario(source: str | Path) -> Scenario:
     """Read a scenario from a TOML file, or by the bare name of one that comes with dqslam.
 
-    A file may say `base = "NAME"`; it then only has what differs from that scenario.
+    A file with `base = "NAME"` only needs the settings that differ from that scenario.
 
     Raises
     ------
     FileNotFoundError
-        When there is no such file; lists the names that come with dqslam.
+        If there is no such file; the error lists the names that come with dqslam.
     FileError
         When the file is no scenario; names the file, and the line of every wrong setting.
 
@@ -225,7 +225,7 @@ def load_scenario(source: str | Path) -> Scenario:
 
 
 def _with_base(file: TomlFile) -> dict[str, Any]:
-    """Return the settings of the base of a file, with the changes that the file makes."""
+    """Return the settings of the base of a file, with the changes of the file."""
     base = file.content["base"]
     if not isinstance(base, str):
         raise file.error(("base",), f"base: expected the name of a scenario, not {base!r}")
@@ -247,7 +247,7 @@ def _merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
 
 
 def _folders() -> list[Path]:
-    """Where named scenarios are: in the installed package, or in a checkout."""
+    """Return the folders of named scenarios, in the installed package or in a checkout."""
     here = Path(__file__).resolve()
     return [root / "data" / "scenarios" for root in (here.parents[1], here.parents[3])]
 

@@ -1,4 +1,4 @@
-"""Simulated recordings: from a scenario and a seed to what a robot would have recorded."""
+"""Simulated recordings: from a scenario and a seed to the recording of a robot."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -148,7 +148,7 @@ def _log_normal(
     from scipy.spatial.transform import Rotation
 
     normal = random.normal(size=(count, 3, 3))
-    # Symmetric, with variance 1 on the diagonal and 1/2 beside it: alike from any side.
+    # Symmetric, with variance 1 on the diagonal and 1/2 off it, so that it is isotropic.
     logarithm, axes = np.linalg.eigh((normal + normal.transpose(0, 2, 1)) / 2.0)
     axes[:, :, 0] *= np.linalg.det(axes)[:, None]  # right-handed
     semi_axes = size.median_m * size.spread**logarithm
@@ -156,7 +156,7 @@ def _log_normal(
 
 
 def _half_height(semi_axes: Floats, orientation: Floats) -> Floats:
-    """Return how far ellipsoids go up from their centers, m, (o,)."""
+    """Return the height of the top of ellipsoids above their centers, m, (o,)."""
     from scipy.spatial.transform import Rotation
 
     up_in_object = Rotation.from_quat(orientation).inv().apply(_UP)

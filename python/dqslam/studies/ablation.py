@@ -1,6 +1,7 @@
-"""What each part of the estimator is worth: the paper's scenario, with one part changed at a time.
+"""The value of each part of the estimator: the paper's scenario with one part changed at a time.
 
-Objects are ellipsoids and sigmas are those of the noise, so that the bound can be reached.
+Objects are ellipsoids and the sigmas are those of the simulated noise, so that the bound can be
+reached.
 """
 
 import time
@@ -26,7 +27,8 @@ from dqslam.simulation.simulator import simulate
 from dqslam.studies.pool import run_each
 from dqslam.uncertainty import posterior_bound, true_state
 
-# Half a chi-square above the cost of a start at the truth: another minimum, or none.
+# A cost that exceeds that of a start at the truth by more than this, half a chi-square, is another
+# minimum or none.
 COST_TOLERANCE = 0.05
 WRONG_SHARE = 0.2
 WRONG_KINDS: "tuple[WrongKind, ...]" = ("random", "structured")
@@ -39,7 +41,7 @@ Progress = Callable[[int, int], None]
 
 @dataclass(frozen=True)
 class Variant:
-    """An estimator that is the default one but for these parts; wrong ids only where named."""
+    """The default estimator with some parts changed; ids are right unless wrong ones are named."""
 
     residual: Residual = Residual.TANGENT_THEN_BOX
     start: Start = Start.SPHERE
@@ -50,7 +52,7 @@ class Variant:
     """Whether boxes with wrong ids are left out beforehand."""
 
     def options(self) -> SolveOptions:
-        """Return the solver's options; raw algebraic is on free dual quadrics, as published."""
+        """Return the solver's options; raw algebraic goes with free dual quadrics, as published."""
         options = SolveOptions(
             residual=self.residual, start=self.start, schedule=self.schedule, loss=self.loss
         )
@@ -74,12 +76,12 @@ class VariantSolve:
     """One solve of one trial; no error where it failed."""
 
     reached: bool
-    """Whether it ended at the cost that a start at the truth reaches. Where it minimizes another
-    cost, of another residual or with wrong ids: whether a polish that is told gets there."""
+    """Whether it ended at the cost that a start at the truth reaches. If it minimizes another cost,
+    because of its residual or of wrong ids, whether a polish with the right ids ends there."""
     error_m: float
     """Mean distance of the poses from the truth; NaN where the solve failed."""
     bound_m: float
-    """Its expectation for the best estimator there can be: the posterior bound at the truth."""
+    """The expected error of the best possible estimator: the posterior bound at the truth."""
     iterations: int
     seconds: float
     failure: str = ""
@@ -95,24 +97,24 @@ class AblationTrial:
 
 @dataclass(frozen=True, eq=False)
 class _Problem:
-    """What one kind of data of one seed comes to."""
+    """The problem of one seed with one kind of data."""
 
     graph: Graph
     told: Graph
-    """The same without boxes of wrong ids."""
+    """The same problem without the boxes whose ids are wrong."""
     truth: Truth
     bound_m: float
     best_cost: float
-    """Of the default estimator that is told, and starts at the truth."""
+    """Cost of the default estimator that knows the right ids and starts at the truth."""
 
     def graph_of(self, variant: Variant) -> Graph:
-        """Return what a variant is given."""
+        """Return the problem that a variant solves."""
         return self.told if variant.told else self.graph
 
     def is_optimum(self, variant: Variant, solution: _core.Solution) -> bool:
-        """Say whether a solution has the best cost, or leads to it where its own cost is another.
+        """Return whether a solution has the best cost, or leads to it if its own cost is another.
 
-        A solve that minimizes the very same cost is judged as it is; any other is polished first.
+        A solve that minimizes the very same cost is compared as it is; any other is polished first.
         """
         cost = solution.summary.final_cost
         same = variant.residual in (Residual.BOX, Residual.TANGENT_THEN_BOX) and (
@@ -139,15 +141,15 @@ class Row:
     optimum_rate: float
     """Share of the trials that reached the optimum."""
     error_over_bound: float
-    """Mean error over mean bound, of the trials that did not fail; 1 is the limit."""
+    """Mean error divided by mean bound, of the trials that did not fail; 1 is the best possible."""
     median_error_over_bound: float
     iterations_med: float
     seconds_med: float
     failures: dict[int, str]
-    """Why a trial failed, by its seed."""
+    """The reason why a trial failed, by its seed."""
 
     def as_dict(self) -> dict[str, Any]:
-        """Lay out the row as plain data: the parts of the variant by name."""
+        """Return the row as plain data, with the parts of the variant by name."""
         parts = asdict(self.variant)
         for part in ("residual", "start", "schedule", "loss"):
             parts[part] = parts[part].name.lower()
@@ -191,9 +193,9 @@ def run_ablation(
     Parameters
     ----------
     jobs
-        Processes; with 1 everything runs in this one. The numbers do not depend on it, times do.
+        Number of processes; with 1 everything runs in this process. Only times depend on it.
     variants
-        All when not given.
+        The variants to run, by default all.
     progress
         Called with (trials done, trials) after each.
     """

@@ -1,4 +1,4 @@
-"""Which motions determine an object: the paper's open problem, one object and one motion at a time.
+"""Which motions determine an object: the paper's open problem, for one object and motion at a time.
 
 [S&M17] section 4.3 starts from Q* = I because the SVD start "tends to result in degenerate
 solutions in the case of close-to-planar camera trajectories". Here the poses are known (mapping),
@@ -23,17 +23,18 @@ from dqslam.recording import Detections, Odometry, Recording
 from dqslam.simulation.detector import cut_at_border
 
 BOX_SIGMA_PX = 1.0
-# Half a chi-square: what ends higher above the cost of a start at the truth is another minimum.
+# A cost that exceeds that of a start at the truth by more than this, half a chi-square, is another
+# minimum.
 COST_TOLERANCE = 0.05
-# What an edge's error of 1 px is in the paper's residual, 5 m away and 200 px wide: side^3 depth^2,
-# px^4 m^2. With known poses it scales the cost, nothing else.
+# The paper's residual for an edge that is off by 1 px, at a distance of 5 m and a width of 200 px:
+# side^3 depth^2, in px^4 m^2. With known poses it only scales the cost.
 ALGEBRAIC_SIGMA = 2e8
 
 Progress = Callable[[int, int], None]
 
 
 class CameraMotion(NamedTuple):
-    """Where the robot goes on the plane, and where it has the object."""
+    """The path of the robot on the plane, and the place of the object."""
 
     poses: Floats  # world_from_robot, SE(2), from the origin on, (n, 3)
     camera_heading: float  # counter-clockwise from forward, rad
@@ -45,7 +46,7 @@ def _straight(length_m: float) -> Floats:
 
 
 def _around(turn: float) -> Floats:
-    """Turn left on a circle of 5 m by an angle, rad."""
+    """Return a path on a circle of 5 m, which turns left by an angle [rad]."""
     heading = np.linspace(0.0, turn, 31)
     return np.column_stack([5.0 * np.sin(heading), 5.0 * (1.0 - np.cos(heading)), heading])
 
@@ -64,7 +65,7 @@ ESTIMATORS = ("paper", "dqslam")
 def method_options(estimator: str, start: Start) -> SolveOptions:
     """Return the options of an estimator from a start.
 
-    "paper" is its algebraic residual on free dual quadrics, "dqslam" the solver's defaults.
+    "paper" is the algebraic residual with free dual quadrics, "dqslam" the solver's defaults.
     """
     options = SolveOptions(mode=_core.Mode.MAPPING, schedule=_core.Schedule.BATCH, start=start)
     if estimator == "paper":
@@ -79,7 +80,7 @@ class ObjectSolve:
     """One solve of one object."""
 
     converged: bool
-    """To the cost that a start at the truth reaches, or below it."""
+    """Whether it reached the cost that a start at the truth reaches, or a lower one."""
     center_error_m: float
     is_ellipsoid: bool
 
@@ -91,7 +92,7 @@ class DegeneracyTrial:
     solves: dict[tuple[str, str, str], ObjectSolve]
     """By motion, estimator and start."""
     singular_values: dict[str, Floats]
-    """Of the SVD start over the largest, descending, shape (10,), by motion."""
+    """Singular values of the SVD start over the largest one, descending, shape (10,), by motion."""
 
 
 def run_trial(seed: int) -> DegeneracyTrial:
@@ -153,7 +154,7 @@ def _camera(heading: float) -> Camera:
 
 
 def _exact_odometry(poses: Floats) -> Odometry:
-    """Return odometry without error; that poses are known makes its covariance idle."""
+    """Return odometry without error; its covariance has no effect, because the poses are known."""
     relative = _core.between(PoseModel.SE2, poses[:-1], poses[1:])
     return Odometry(PoseModel.SE2, poses[0], relative, np.tile(np.eye(3), (len(relative), 1, 1)))
 
@@ -187,7 +188,7 @@ class Row:
     estimator: str
     start: str
     converged: float
-    """Share of the trials, as are all but the errors."""
+    """Share of the trials that converged."""
     ellipsoids: float
     center_error_m: tuple[float, float, float]
     """Quartiles: 25 %, median, 75 %."""
@@ -195,11 +196,11 @@ class Row:
 
 @dataclass(frozen=True)
 class MotionRow:
-    """What a motion alone decides, over all trials."""
+    """The results that depend only on the motion, over all trials."""
 
     motion: str
     singular_values: tuple[float, ...]
-    """Medians, of the SVD start over the largest, descending, ten."""
+    """Medians of the ten singular values of the SVD start over the largest one, descending."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""What ``dqslam view`` shows: one scene, on a live page, on a static page, or as a Rerun file."""
+"""The scene of ``dqslam view``, on a live page, on a static page, or as a Rerun file."""
 
 from dqslam.view.live import serve as serve
 from dqslam.view.page import write_page as write_page

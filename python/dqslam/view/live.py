@@ -1,4 +1,4 @@
-"""A scene on a live page: viser serves it and answers clicks."""
+"""A scene on a live page, which viser serves."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from dqslam.view.scene import Scene, SceneObject, Spread, rgb
 if TYPE_CHECKING:
     from viser import ViserServer
 
-FIELD_OF_VIEW = np.radians(60.0)  # of the eye, vertical
+FIELD_OF_VIEW = np.radians(60.0)  # vertical, of the viewer's camera
 _NOTHING = "nothing"
 _HERE = ("127.0.0.1", "0.0.0.0", "::1", "::")
 
@@ -27,7 +27,7 @@ _HERE = ("127.0.0.1", "0.0.0.0", "::1", "::")
 def serve(scene: Scene, *, host: str = "127.0.0.1", port: int = 8080) -> Iterator[str]:
     """Serve a scene while inside, and give the page's address; needs ``dqslam[view]``.
 
-    Where the port is taken it is the next free one.
+    If the port is taken, the next free one is used.
     """
     try:
         import viser
@@ -35,10 +35,10 @@ def serve(scene: Scene, *, host: str = "127.0.0.1", port: int = 8080) -> Iterato
         raise RuntimeError(
             "the live page needs viser: pip install 'dqslam[view]' (--export does without)"
         ) from None
-    with redirect_stdout(StringIO()):  # what is printed is for the command line to say
+    with redirect_stdout(StringIO()):  # only the command line prints
         server = viser.ViserServer(host=host, port=port, label=scene.title, verbose=False)
     try:
-        # Its share button would send the scene to somebody else's server.
+        # The share button would send the scene to a server of a third party.
         server.gui.configure_theme(show_logo=False, show_share_button=False)
         _Page(server, scene)
         name = "localhost" if host in _HERE else host
@@ -49,7 +49,7 @@ def serve(scene: Scene, *, host: str = "127.0.0.1", port: int = 8080) -> Iterato
 
 
 class _Page:
-    """What is on the page, and what it does when something is clicked."""
+    """The content of the page, and its reactions to clicks."""
 
     def __init__(self, server: ViserServer, scene: Scene) -> None:
         self.server, self.scene = server, scene
@@ -187,11 +187,11 @@ class _Page:
 
 
 def place_eye(scene: Scene) -> tuple[Floats, Floats, float]:
-    """Return where to look from and at, (3,) each, to see all, and how far that reaches, meters."""
+    """Return the places (3,) to look from and at for a view of all, and its radius, meters."""
     points = scene.estimate[:, :3]
     low, high = points.min(axis=0), points.max(axis=0)
     if scene.objects:
-        # Not the few that lie far away: all else would be a dot.
+        # A few things that are far away do not count, or everything else would be a dot.
         centers = np.array([one.center for one in scene.objects])
         low = np.minimum(low, np.quantile(centers, 0.1, axis=0))
         high = np.maximum(high, np.quantile(centers, 0.9, axis=0))
@@ -213,7 +213,7 @@ def _ellipsoid(
     opacity: float,
     wireframe: bool = False,
 ) -> Any:
-    """Add an object; None where it is no ellipsoid."""
+    """Add an object; return None if it is not an ellipsoid."""
     if one.semi_axes is None or one.orientation_xyzw is None:
         return None
     return server.scene.add_icosphere(
@@ -229,7 +229,7 @@ def _ellipsoid(
 
 
 def _placed(pose: Floats) -> dict[str, Any]:
-    """Return viser's way to say where something is, of [tx ty tz qx qy qz qw]."""
+    """Return viser's keyword arguments for a pose [tx ty tz qx qy qz qw]."""
     return {"position": pose[:3], "wxyz": pose[[6, 3, 4, 5]]}
 
 

@@ -1,4 +1,4 @@
-"""What is known of an estimate and its objects, in words: pairs of what it is and how much."""
+"""Numbers of an estimate and its objects as text: pairs of a name and a value."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def overview(results: Results, evaluation: Mapping[str, Any]) -> Numbers:
 
 
 def object_numbers(results: Results, evaluation: Mapping[str, Any]) -> list[Numbers]:
-    """Describe each mapped object; with the truth, how far it is off."""
+    """Describe each mapped object, with its errors if there is a truth."""
     objects, boxes = results.objects, results.boxes
     overlap = None if boxes is None else box_overlaps(results, boxes)
     judged = evaluation.get("objects")
@@ -95,7 +95,7 @@ def _vector(values: Floats) -> str:
 
 
 def _lengths(values: Floats) -> str:
-    """Write lengths side by side, in millimeters where none reaches 0.1 m."""
+    """Write lengths side by side, in millimeters if none reaches 0.1 m."""
     if values.max() < 0.1:
         return " × ".join(f"{1e3 * value:.2g}" for value in values) + " mm"
     return " × ".join(f"{value:.3f}" for value in values) + " m"

@@ -1,8 +1,8 @@
-"""A scene as a folder of a page that any web server shows, and a browser without one.
+"""A scene as a folder with a page that works on any web server, and in a browser without one.
 
-The page is our own few hundred lines without any library: viser's static export holds the scene but
-neither slider nor click, and a 3D library would be a hundred times as large as what it is needed
-for. Nothing is fetched from elsewhere.
+The page has a few hundred lines of our own and no library. viser's static export has the scene but
+no slider and no clicks, and a 3D library would be a hundred times as large as the part that is
+needed. Nothing is fetched from elsewhere.
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ from dqslam.io.files import write_text
 from dqslam.view.scene import Scene, SceneObject, Spread
 
 _STATIC = Path(__file__).with_name("static")
-# Micrometers and microradians: more would only make the file larger.
+# Micrometers and microradians are enough; more digits would only make the file larger.
 _DECIMALS = 6
 
 
 def write_page(scene: Scene, directory: str | Path) -> Path:
-    """Write the page into a directory, which is made if need be, and return its ``index.html``."""
+    """Write the page into a directory, created if needed, and return its ``index.html``."""
     directory = Path(directory)
     directory.mkdir(parents=True, exist_ok=True)
     for source in sorted(_STATIC.iterdir()):
         shutil.copyfile(source, directory / source.name)
-    # As a script, not as JSON: a browser that opens the folder itself may not fetch files.
+    # A script, not JSON, because a browser that opens the folder itself may not fetch files.
     text = json.dumps(_describe(scene), separators=(",", ":"), allow_nan=False)
     write_text(directory / "scene.js", f"const scene = {text};\n")
     return directory / "index.html"
@@ -80,7 +80,7 @@ def _object(one: SceneObject) -> dict[str, Any]:
 def _spread(one: Spread) -> dict[str, Any]:
     return {
         "center": _rounded(one.center),
-        "semiAxes": one.semi_axes.tolist(),  # which may be far below a micrometer
+        "semiAxes": one.semi_axes.tolist(),  # not rounded, as they may be far below a micrometer
         "orientation": _rounded(one.orientation_xyzw),
     }
 

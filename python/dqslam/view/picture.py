@@ -1,4 +1,4 @@
-"""The image plane of one moment as SVG: its boxes, and the outlines of the objects in it."""
+"""The image plane of one pose as SVG, with its boxes and the outlines of the objects in it."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from dqslam.view.scene import Scene
 
 _DASHES = {"fits": "", "misfit": "6 4", "held out": "1.5 3", "left out": ""}
 _POINTS = 64
-_GREY = "#999999"
+_GRAY = "#999999"
 
 
 def outlines_in_image(scene: Scene, frame: int) -> tuple[Ints, Floats]:
     """Return the rows of the objects that are in an image, (k,), and their outlines, (k, p, 2).
 
-    Those that are in front of the camera and meet the image, from far to near.
+    These are in front of the camera and overlap the image, ordered from far to near.
     """
     ellipsoids = np.full((len(scene.objects), 9), np.nan)
     for row, one in enumerate(scene.objects):
@@ -28,9 +28,9 @@ def outlines_in_image(scene: Scene, frame: int) -> tuple[Ints, Floats]:
 
 
 def draw_image(scene: Scene, frame: int, selected: int | None = None) -> str:
-    """Return the SVG of an image; ``selected`` is the row of an object to stress."""
+    """Return the SVG of an image; ``selected`` is the row of an object to highlight."""
     width, height = scene.camera.width, scene.camera.height
-    line = width / 320.0  # a pixel of the screen, about
+    line = width / 320.0  # about one pixel of the screen
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="-0.5 -0.5 {width} {height}" '
         f'style="width:100%;background:#fff;display:block" font-family="sans-serif" '
@@ -57,7 +57,7 @@ def _box(scene: Scene, row: int, selected: int | None, line: float) -> str:
     boxes = scene.boxes
     left, top, right, bottom = boxes.box[row]
     of = int(boxes.object[row])
-    color = scene.objects[of].color if of >= 0 else _GREY
+    color = scene.objects[of].color if of >= 0 else _GRAY
     thickness = 0.8 if of < 0 else 3.0 if of == selected else 1.8
     dashes = " ".join(f"{line * float(dash):.1f}" for dash in _DASHES[boxes.state[row]].split())
     return (

@@ -23,9 +23,9 @@ def write_rerun(
 ) -> None:
     """Write an ``.rrd`` file; needs ``dqslam[rerun]``. `progress` gets the share of the images.
 
-    ``world/``: ``estimate``, ``odometry``, ``truth``, ``objects``, ``true_objects``, ``covariance``
-    once and for all; on the timelines ``time`` [s] and ``image`` the ``camera``, and in its image
-    ``boxes`` and ``outlines``.
+    ``world/`` has the static entities ``estimate``, ``odometry``, ``truth``, ``objects``,
+    ``true_objects`` and ``covariance``. On the timelines ``time`` [s] and ``image`` it has the
+    ``camera``, and in its image ``boxes`` and ``outlines``.
     """
     try:
         import rerun
@@ -39,7 +39,7 @@ def write_rerun(
         for frame in range(len(scene.timestamps)):
             _log_frame(stream, scene, frame)
             progress((frame + 1) / len(scene.timestamps))
-        stream.disconnect()  # which writes what is left
+        stream.disconnect()  # writes the rest
 
 
 def _log_world(stream: RecordingStream, scene: Scene) -> None:
@@ -73,7 +73,7 @@ def _log_world(stream: RecordingStream, scene: Scene) -> None:
 
 
 def _log_up(stream: RecordingStream, up: Floats) -> None:
-    """Log which axis of the world is up, if one is."""
+    """Log the axis of the world that is up, if there is one."""
     import rerun
 
     axis = int(np.argmax(np.abs(up)))
@@ -91,7 +91,7 @@ def _log_objects(
     *,
     labels: bool = True,
 ) -> None:
-    """Log ellipsoids, and as points what is none."""
+    """Log ellipsoids, and other objects as points."""
     import rerun
 
     bodies = [k for k, one in enumerate(objects) if one.semi_axes is not None]
@@ -156,5 +156,5 @@ def _box_color(scene: Scene, row: int) -> tuple[int, int, int]:
 
 
 def _from_corner(pixels: Floats) -> Floats:
-    """Return pixels counted from the corner of the image, as Rerun does, not from a center."""
+    """Return pixels counted from the corner of the image, as in Rerun, instead of from a center."""
     return pixels + 0.5

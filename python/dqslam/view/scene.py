@@ -1,4 +1,4 @@
-"""What there is to see, as plain data: every viewer shows this, none computes it.
+"""The visible scene as plain data: every viewer shows it, and none computes anything.
 
 The world is that of the estimate, meters; the truth is moved into it. Poses are world_from_camera,
 [tx ty tz qx qy qz qw], boxes [u_min, v_min, u_max, v_max] in undistorted pixels.
@@ -20,20 +20,20 @@ from dqslam.io import BoxTable, MapObjects, Results, Trajectory, TrueObjects
 from dqslam.metrics import Align, Alignment, up_direction
 from dqslam.view.numbers import Numbers, object_numbers, overview, true_object_numbers
 
-# Those that no path has, then more of the same kind (Tol's).
+# The colors that no path has, then more of the same kind (Tol's).
 CLASSES = (ORANGE, SKY, PURPLE, "#882255", "#999933", "#332288", "#44AA99", "#AA4499")
-# Where so many times the usual number of poses has no true one, nothing is drawn between.
+# If more poses than this multiple of the usual number have no true one, the line has a gap.
 GAP = 5.0
-# Shown where covariances are.
+# The number of standard deviations that is shown.
 SIGMAS = 3.0
 CAMERAS = 60
-# Square meters: no axis of an ellipsoid is zero.
+# Added variance, m^2, so that no axis of an ellipsoid is zero.
 _NOTHING = 1e-18
 
 
 @dataclass(frozen=True, eq=False)
 class Spread:
-    """The ellipsoid of ``SIGMAS`` standard deviations of a place."""
+    """The ellipsoid of ``SIGMAS`` standard deviations of a position."""
 
     center: Floats
     """Meters, shape (3,)."""
@@ -48,20 +48,20 @@ class SceneObject:
     """One object of the map or of the truth."""
 
     id: int
-    """-1 for a true object without one."""
+    """Id of the object, -1 for a true object without one."""
     class_name: str
     color: str
-    """``#rrggbb``, one a class; one an object where there is one class only."""
+    """``#rrggbb``, one for each class, or one for each object if there is only one class."""
     center: Floats
     """Meters, shape (3,)."""
     semi_axes: Floats | None
-    """Meters, shape (3,); None where it is no ellipsoid, or its size is unknown."""
+    """Meters, shape (3,); None if it is not an ellipsoid or has no known size."""
     orientation_xyzw: Floats | None
     """world_from_object, shape (4,); None with ``semi_axes``."""
     center_covariance: Floats | None
     """Square meters, shape (3, 3); None where unknown."""
     numbers: Numbers
-    """What is known of it, in words."""
+    """Its properties as text."""
 
     @property
     def ellipsoid(self) -> Floats | None:
@@ -72,7 +72,7 @@ class SceneObject:
 
     @property
     def spread(self) -> Spread | None:
-        """How uncertain the center is."""
+        """The uncertainty of the center."""
         if self.center_covariance is None:
             return None
         return spread_of(self.center, self.center_covariance)
@@ -83,11 +83,11 @@ class SceneBoxes:
     """All boxes, in the order of their poses."""
 
     pose: Ints
-    """Row of the pose it was seen from, shape (m,)."""
+    """Row of the pose from which it was observed, shape (m,)."""
     box: Floats
     """Shape (m, 4)."""
     object: Ints
-    """Row of the mapped object it was taken for, -1 for none; shape (m,)."""
+    """Row of the mapped object that it was assigned to, -1 for none; shape (m,)."""
     class_name: tuple[str, ...]
     """One per box."""
     state: tuple[str, ...]
@@ -100,7 +100,7 @@ class SceneBoxes:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """All that a viewer shows."""
+    """Everything that a viewer shows."""
 
     title: str
     up: Floats
@@ -113,16 +113,16 @@ class Scene:
     odometry: Floats
     """Shape (n, 7)."""
     cameras: Ints
-    """Rows of the poses whose cameras are drawn: not all of many."""
+    """Rows of the poses whose cameras are drawn; not all if there are many."""
     pose_spreads: tuple[Spread, ...]
-    """How uncertain positions are, where known, of as many."""
+    """The uncertainty of positions, where known, of at most as many poses."""
     truth: tuple[Floats, ...]
     """True poses at the times that have one, in runs without a gap, each of shape (t, 7)."""
     objects: tuple[SceneObject, ...]
     true_objects: tuple[SceneObject, ...]
     boxes: SceneBoxes
     overview: Numbers
-    """What is known of the whole, in words."""
+    """The properties of the whole estimate as text."""
 
 
 def rgb(color: str) -> tuple[int, int, int]:
@@ -132,11 +132,11 @@ def rgb(color: str) -> tuple[int, int, int]:
 
 
 def spread_of(center: Floats, covariance: Floats) -> Spread:
-    """Return the spread of a place (3,) [m] with a covariance (3, 3) [m^2]."""
+    """Return the spread of a position (3,) [m] with a covariance (3, 3) [m^2]."""
     from scipy.spatial.transform import Rotation
 
     squares, axes = np.linalg.eigh(covariance)
-    axes[:, 0] *= np.linalg.det(axes)  # a rotation, not a reflection
+    axes[:, 0] *= np.linalg.det(axes)  # makes it a rotation, not a reflection
     semi_axes = SIGMAS * np.sqrt(squares.clip(min=_NOTHING))
     return Spread(center, semi_axes, Rotation.from_matrix(axes).as_quat())
 
@@ -148,19 +148,20 @@ def build_scene(
     objects: TrueObjects | None = None,
     align: Align = "se3",
 ) -> Scene:
-    """Return what there is to see of an estimate.
+    """Return the scene of an estimate.
 
     Parameters
     ----------
     groundtruth, objects
-        The true trajectory and objects, in any world: ``evaluate_results`` finds where that lies.
+        The true trajectory and objects, in any world; ``evaluate_results`` aligns it.
     align
-        The kind of motion between both worlds, see ``evaluate.align_positions``.
+        The kind of motion between both worlds, see ``metrics.align_positions``.
 
     Raises
     ------
     ValueError
-        For true objects without a true trajectory, and where the latter meets no pose.
+        If there are true objects without a true trajectory, or a true trajectory whose times
+        match no pose.
     """
     if objects is not None and groundtruth is None:
         raise ValueError(f"{objects.path}: where true objects lie, only a true trajectory can tell")
@@ -194,7 +195,7 @@ def build_scene(
 
 
 def _some(rows: Ints) -> Ints:
-    """Return at most ``CAMERAS`` of some rows, spread evenly."""
+    """Return at most ``CAMERAS`` of some rows, evenly spread."""
     return rows[:: max(1, -(-len(rows) // CAMERAS))]
 
 
@@ -213,7 +214,7 @@ def _pose_spreads(results: Results) -> tuple[Spread, ...]:
 
 
 def _gaps(rows: Ints) -> Ints:
-    """Return before which of some rows others are left out, more than usual by far."""
+    """Return the rows before which far more rows than usual are missing."""
     steps = np.diff(rows)
     return np.asarray(np.flatnonzero(steps > GAP * np.median(steps)) + 1)
 

@@ -1,4 +1,4 @@
-"""Cameras from files, one module a format; all become OpenCV's pinhole with k1 k2 p1 p2 k3."""
+"""Cameras from files, a module for each format; all become OpenCV's pinhole with k1 k2 p1 p2 k3."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ def read_camera(
 ) -> _core.Camera:
     """Read a pinhole camera with its lens distortion.
 
-    ``format`` is one of CAMERA_FORMATS; by default it is told by the look of the file. ``topic`` is
-    that of a bag with several.
+    ``format`` is one of CAMERA_FORMATS; by default it is recognized from the file. ``topic``
+    selects one of several cameras in a bag.
     """
     chosen = choose_format(path, format, CAMERA_FORMATS, "camera")
     return chosen.read(path, **topic_option(chosen.name, topic))

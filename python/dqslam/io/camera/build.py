@@ -1,4 +1,4 @@
-"""What all camera formats check before they make a camera."""
+"""The checks that all camera formats share."""
 
 from __future__ import annotations
 

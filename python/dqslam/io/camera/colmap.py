@@ -1,7 +1,7 @@
 """Cameras from COLMAP's ``cameras.txt``: ``CAMERA_ID MODEL WIDTH HEIGHT PARAMS...``.
 
-COLMAP counts pixels from the corner of the image, so that the first pixel's center is at 0.5: half
-a pixel is taken from its principal point. One camera a file.
+COLMAP counts pixels from the corner of the image, so that the first pixel's center is at 0.5. Half
+a pixel is therefore subtracted from its principal point. A file must have one camera.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dqslam.io.camera.build import make_camera
 from dqslam.io.files import FileError, parse_numbers, read_rows, write_text
 from dqslam.io.formats import Format, Look
 
-# Names of the parameters; f stands for both focal lengths, k4 k5 k6 must be zero.
+# Names of the parameters; f stands for both focal lengths, and k4 k5 k6 must be zero.
 MODELS = {
     "SIMPLE_PINHOLE": ("f", "cx", "cy"),
     "PINHOLE": ("fx", "fy", "cx", "cy"),

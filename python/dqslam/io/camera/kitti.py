@@ -1,9 +1,9 @@
 """Cameras from KITTI's calibration: the 3 x 4 projection of the left color camera, rectified.
 
-``P2:`` in the files of the odometry, tracking and object benchmarks, ``P_rect_02:`` in the raw
-``calib_cam_to_cam.txt``. No distortion, integer pixel coordinates at pixel centers. Only the raw
-file has the image size, ``S_rect_02:``; to the others add such a line, for instance
-``S_rect_02: 1242 375``.
+It is ``P2:`` in the files of the odometry, tracking and object benchmarks, and ``P_rect_02:`` in
+the raw ``calib_cam_to_cam.txt``. There is no distortion, and integer pixel coordinates are pixel
+centers. Only the raw file has the image size, ``S_rect_02:``; the others need such a line added,
+for instance ``S_rect_02: 1242 375``.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Cameras from ROS: the YAML of camera_calibration (camera_info), and a CameraInfo as printed.
 
-``camera_matrix`` (or K, k) and ``distortion_coefficients`` (or D, d) of the raw image, model
-``plumb_bob``: k1 k2 p1 p2 k3, integer pixel coordinates at pixel centers. Boxes in a rectified
-image need the camera of ``projection_matrix`` instead, without distortion, which is not what is
-read here. Needs PyYAML: pip install 'dqslam[yaml]'.
+``camera_matrix`` (or K, k) and ``distortion_coefficients`` (or D, d) belong to the raw image and
+the model ``plumb_bob``, k1 k2 p1 p2 k3, with integer pixel coordinates at pixel centers. Boxes in a
+rectified image need the camera of ``projection_matrix`` without distortion, which is not read here.
+This needs PyYAML: pip install 'dqslam[yaml]'.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from dqslam.io.files import FileError, read_text, write_text
 from dqslam.io.formats import Format, Look
 from dqslam.io.yaml import parse_yaml
 
-# The names of the calibration file, of ROS 1's and of ROS 2's message.
+# The names in the calibration file, in ROS 1's message and in ROS 2's.
 NAMES = {
     "width": ("image_width", "width"),
     "height": ("image_height", "height"),
@@ -36,7 +36,7 @@ def read_ros(path: str | Path) -> _core.Camera:
 
 
 def camera_of_info(path: str | Path, table: dict[str, Any], text: str = "") -> _core.Camera:
-    """Make a camera of the fields of a camera_info, whose text tells lines."""
+    """Make a camera from the fields of a camera_info; its text gives the lines for errors."""
 
     def line_of(key: str) -> int | None:
         for number, line in enumerate(text.split("\n"), start=1):
@@ -92,7 +92,7 @@ def write_ros(path: str | Path, camera: _core.Camera) -> None:
     ]
     lines.append("distortion_model: plumb_bob")
     for name, rows, columns, data in blocks:
-        # For YAML 1.1 a number has a point: 1e-05 is text.
+        # In YAML 1.1 a number needs a point: 1e-05 is text.
         cells = ", ".join(_decimal(value) for value in data)
         lines += [f"{name}:", f"  rows: {rows}", f"  cols: {columns}", f"  data: [{cells}]"]
     write_text(path, "\n".join(lines) + "\n")
@@ -117,7 +117,7 @@ def _numbers(path: str | Path, key: str, values: list[Any], line_of: Any) -> lis
     numbers = []
     for value in values:
         try:
-            # YAML 1.1 takes 1e-05 for text.
+            # YAML 1.1 reads 1e-05 as text.
             number = math.nan if isinstance(value, bool) else float(value)
         except (TypeError, ValueError):
             raise FileError(path, f"{key} holds {value!r}, not a number", line_of(key)) from None

@@ -1,9 +1,9 @@
 """Cameras from JSON or TOML.
 
-Keys: ``fx fy cx cy`` px, ``width height`` px, and the lens distortion of OpenCV's five numbers
-(absent: none) as ``k1 k2 p1 p2 k3``, or as a list in that order under ``distortion`` or
+The keys are ``fx fy cx cy`` px, ``width height`` px, and optionally OpenCV's five numbers of lens
+distortion: as ``k1 k2 p1 p2 k3``, or as a list in that order under ``distortion`` or
 ``dist_k1k2p1p2k3``, or as a table ``distortion``. Other keys are ignored.
-Integer pixel coordinates are pixel centers: the image spans [-0.5, width - 0.5] in x.
+Integer pixel coordinates are pixel centers, so the image spans [-0.5, width - 0.5] in x.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from dqslam.io.files import FileError, read_text, write_json, write_text
 from dqslam.io.formats import Format
 
 DISTORTION_LISTS = ("distortion", "dist_k1k2p1p2k3")
-# Reading these as pinhole with radial and tangential distortion would be wrong without a sign.
+# Reading these as a pinhole with radial and tangential distortion would be wrong, silently.
 OTHER_MODELS = ("fisheye", "equidistant", "kannala", "omni", "double_sphere", "rational", "fov")
 
 
@@ -36,12 +36,12 @@ def read_toml(path: str | Path) -> _core.Camera:
 
 
 def write_json_camera(path: str | Path, camera: _core.Camera) -> None:
-    """Write a camera as JSON that comes back to the last bit."""
+    """Write a camera as JSON, without loss of a bit."""
     write_json(path, _values(camera))
 
 
 def write_toml(path: str | Path, camera: _core.Camera) -> None:
-    """Write a camera as TOML that comes back to the last bit."""
+    """Write a camera as TOML, without loss of a bit."""
     write_text(path, "".join(f"{key} = {value!r}\n" for key, value in _values(camera).items()))
 
 
@@ -112,7 +112,7 @@ def _number(path: str | Path, text: str, key: str, value: Any) -> float:
 
 
 def _line_of(text: str, key: str) -> int | None:
-    """Find the first line that sets a key; None when it cannot be told."""
+    """Find the first line that sets a key, or None if there is no such line."""
     for number, line in enumerate(text.split("\n"), start=1):
         if re.search(rf"(?<![\w-])[\"']?{re.escape(key)}[\"']?\s*(?:[:=\]])", line):
             return number

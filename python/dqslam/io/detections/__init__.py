@@ -1,4 +1,4 @@
-"""Detections from files, one module a format; all become corners in pixels, see `table`."""
+"""Detections from files, one module for each format; all become corners in pixels, see `table`."""
 
 from __future__ import annotations
 
@@ -41,23 +41,23 @@ def read_detections(
     path
         A file, a folder of YOLO files, or the folder of a bag.
     format
-        One of DETECTION_FORMATS; by default it is told by the look of the file.
+        One of DETECTION_FORMATS; by default it is recognized from the file.
     width, height
         Size of the image in px, for YOLO and for `cut`.
     frames
-        Times of the frames, for a format that has none; they go before the file's own.
+        Times of the frames, for a format that has none; they override the file's own.
     classes
-        Names of classes by id; they go before the file's own.
+        Names of classes by id; they override the file's own.
     cut
-        Parts of boxes outside of the image are cut off, and a box that is wholly outside is
+        Whether to cut boxes at the border of the image; a box that is wholly outside is then
         refused.
     check
-        Boxes that are inverted, scores beyond 0 and 1 and times that do not increase are refused.
-        Without, all is as the file has it, for those who look for mistakes.
+        Whether to refuse inverted boxes, scores outside of 0 to 1, and times that do not
+        increase. Without it the table has the content of the file, for a search for mistakes.
     topic
-        Of a bag with several.
+        Topic of a bag that has several.
     progress
-        Told the share that is read, of a bag or a folder.
+        Called with the share of a bag or a folder that has been read.
     """
     chosen = choose_format(path, format, DETECTION_FORMATS, "detections")
     options: dict[str, Any] = dict(topic_option(chosen.name, topic))
@@ -70,7 +70,7 @@ def read_detections(
 
 
 def read_class_names(path: str | Path) -> dict[int, str]:
-    """Read names by class id: COCO's categories, a data.yaml, or a text of one name a line."""
+    """Read class names by id from COCO's categories, a data.yaml, or a text, one per line."""
     suffix = Path(path).suffix.lower()
     if suffix == ".json":
         return read_categories(path)

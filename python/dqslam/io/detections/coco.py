@@ -1,12 +1,12 @@
 """Detections as COCO results: JSON, a list of ``{image_id, category_id, bbox, score}``.
 
 ``bbox`` is x, y, width, height in pixels that count from the corner of the image, so that the first
-pixel spans 0 to 1: half a pixel is taken from the corners. A dataset, ``{images, annotations,
-categories}``, is read alike. The frame is ``image_id`` where that is a whole number, else what the
-image is named, see `dqslam.io.frames.frame_of`. Names of classes are those of ``classes``, of
-``categories``, or the number; a missing score is 1.
+pixel spans 0 to 1. Half a pixel is therefore subtracted from the corners. A dataset, ``{images,
+annotations, categories}``, can be read too. The frame is ``image_id`` if that is a whole number,
+else it comes from the name of the image, see `dqslam.io.frames.frame_of`. Names of classes are
+those of ``classes``, else of ``categories``, else the number. A missing score is 1.
 
-Further keys of an entry, which COCO's own tools ignore and we write: ``category_name``,
+Entries may have further keys, which we write and which COCO's own tools ignore: ``category_name``,
 ``timestamp`` [s], ``track_id``. Without ``timestamp`` the times are those of the frames.
 """
 
@@ -24,7 +24,7 @@ from dqslam.io.files import FileError, read_text, write_text
 from dqslam.io.formats import Format, Look
 from dqslam.io.frames import FrameTimes, frame_of
 
-CORNER = 0.5  #: what COCO's pixels are ahead of ours
+CORNER = 0.5  #: COCO's pixel coordinates minus ours
 DIGITS = 6  #: decimals of a written box
 
 
@@ -36,7 +36,7 @@ def read_coco(
     frames: FrameTimes | None = None,
     classes: dict[int, str] | None = None,
 ) -> DetectionTable:
-    """Read boxes, unchecked; times of ``frames`` and names of ``classes`` go before the file's."""
+    """Read boxes, unchecked; times of ``frames`` and names of ``classes`` override the file's."""
     text = read_text(path)
     entries, rest = parse_entries(path, text, "annotations")
     if not entries:
@@ -72,7 +72,7 @@ def read_coco(
 
 
 def write_coco(path: str | Path, table: DetectionTable, *, times: bool = True) -> None:
-    """Write boxes to a millionth of a pixel, one a line, with or without their times."""
+    """Write boxes to a millionth of a pixel, one per line, with or without their times."""
     corner = table.box + CORNER
     size = corner[:, 2:] - corner[:, :2]
     boxes = np.round(np.hstack([corner[:, :2], size]), DIGITS).tolist()
@@ -94,7 +94,7 @@ def write_coco(path: str | Path, table: DetectionTable, *, times: bool = True) -
 
 
 def has_times(path: str | Path) -> bool:
-    """Tell whether the entries of a file have times of their own."""
+    """Return whether the entries of a file have times."""
     entries, _ = parse_entries(path, read_text(path), "annotations")
     return bool(entries) and "timestamp" in entries[0].fields
 
@@ -108,7 +108,7 @@ def read_categories(path: str | Path) -> dict[int, str]:
 def _frame(entry: Entry, images: dict[Any, str], frames: FrameTimes | None) -> int:
     image = entry.value("image_id")
     name = images.get(image) if isinstance(image, int | str) else None
-    # A dataset numbers its images as it likes: their names go first where they have times.
+    # A dataset may number its images in any way, so names of images with times come first.
     if name is not None and frames is not None and frames.names:
         number = frame_of(name, frames)
         if number is None:

@@ -1,9 +1,9 @@
 """Detections as CSV: ``frame,timestamp,x1,y1,x2,y2,score,class_id,class_name,track_id``.
 
-Corners in pixels, whole numbers at pixel centers, counted from 0.
+Corners are in pixels, with whole numbers at pixel centers, counted from 0.
 The columns are found by name, in any order; others are ignored, and ``track_id`` may be absent.
-An empty score is 1 (trackers give none), an empty ``track_id`` or -1 is a box that no object has
-claimed. Rows may be in any order, but later frames have later times. # starts a comment line.
+An empty score is 1, because trackers give none. An empty ``track_id`` or -1 means that the box has
+no object. Rows may be in any order, but later frames have later times. # starts a comment line.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def read_csv(
     frames: FrameTimes | None = None,
     classes: dict[int, str] | None = None,
 ) -> DetectionTable:
-    """Read boxes, unchecked; times of ``frames`` and names of ``classes`` go before the file's."""
+    """Read boxes, unchecked; times of ``frames`` and names of ``classes`` override the file's."""
     cells = read_table(path, required=REQUIRED)
     frame, class_id = cells.integers("frame"), cells.integers("class_id")
     scores = [score or str(NO_SCORE) for score in cells.cells("score")]
@@ -55,7 +55,7 @@ def read_csv(
 
 
 def write_csv(path: str | Path, table: DetectionTable) -> None:
-    """Write boxes to a millionth of a pixel; times and scores come back to the last bit."""
+    """Write boxes to a millionth of a pixel, and times and scores without loss of a bit."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     tracks = () if table.track_id is None else ("track_id",)

@@ -1,4 +1,4 @@
-"""A list of objects in a JSON file, each with the line where it stands."""
+"""A list of objects in a JSON file, each with its line."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ SPACE = re.compile(r"[ \t\n\r]*")
 
 @dataclass(frozen=True)
 class Entry:
-    """One object of the list; its values are checked when they are asked for."""
+    """One object of the list; its values are checked when they are read."""
 
     path: str | Path
     index: int  #: from 0
@@ -28,27 +28,27 @@ class Entry:
         return FileError(self.path, f"entry {self.index}: {message}", self.line)
 
     def value(self, key: str) -> Any:
-        """Return a value that must be there."""
+        """Return a required value."""
         if key not in self.fields:
             raise self.error(f"missing {key} (it has: {', '.join(self.fields)})")
         return self.fields[key]
 
     def number(self, key: str, default: float | None = None) -> float:
-        """Return a finite number; null is as good as missing."""
+        """Return a finite number; null counts as missing."""
         value = self.value(key) if default is None else self.fields.get(key)
         if value is None and default is not None:
             return default
         return self._number(key, value)
 
     def numbers(self, key: str, count: int) -> list[float]:
-        """Return a list of so many finite numbers."""
+        """Return a list of finite numbers with the given length."""
         values = self.value(key)
         if not isinstance(values, list) or len(values) != count:
             raise self.error(f"{key} is not a list of {count} numbers")
         return [self._number(key, value) for value in values]
 
     def integer(self, key: str, default: int | None = None) -> int:
-        """Return a whole number; null is as good as missing."""
+        """Return a whole number; null counts as missing."""
         value = self.number(key, default)
         if value != math.floor(value) or abs(value) >= 2.0**53:
             raise self.error(f"{key} is {value:g}, not a whole number")
@@ -70,7 +70,7 @@ class Entry:
 
 
 def parse_entries(path: str | Path, text: str, key: str) -> tuple[list[Entry], dict[str, Any]]:
-    """Parse a list of objects, or the one under ``key`` of a table, whose rest is given too."""
+    """Parse a list of objects, or the one under ``key`` of a table; also return the rest of it."""
     decoder = json.JSONDecoder()
     try:
         start = SPACE.match(text).end()  # type: ignore[union-attr]

@@ -1,9 +1,9 @@
 """Detections as MOT Challenge text: ``frame,id,left,top,width,height,conf,...``.
 
-Frames and pixels count from 1: frame 1 is frame 0 here, and 1 is taken from left and top; the width
-is x2 - x1. An ``id`` of -1 is none. With 9 columns (their ground truth) the 8th is the class and
-the 9th the visibility, which is ignored; with 7, 8 or 10 there is no class: all are class 0,
-"object". A ``conf`` of -1 is no score. There are no times, see `dqslam.io.frames`.
+Frames and pixels count from 1: frame 1 is frame 0 here, and 1 is subtracted from left and top. The
+width is x2 - x1. An ``id`` of -1 means none. With 9 columns (their ground truth) the 8th is the
+class and the 9th the visibility, which is ignored. With 7, 8 or 10 there is no class, and all boxes
+have class 0, "object". A ``conf`` of -1 means no score. There are no times, see `dqslam.io.frames`.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from dqslam.io.frames import FrameTimes
 FIELDS = ("frame", "id", "left", "top", "width", "height", "conf")
 WIDTHS = (7, 8, 9, 10)
 WITH_CLASS = 9
-LARGEST_FRAME = 1e9  #: what is larger is a time in nanoseconds
+LARGEST_FRAME = 1e9  #: a larger number is a time in nanoseconds
 FIRST = 1  #: number of the first frame and of the first pixel
 
 
@@ -68,7 +68,7 @@ def read_mot(
 
 
 def write_mot(path: str | Path, table: DetectionTable, *, times: bool = True) -> None:
-    """Write boxes with 9 columns, the class the 8th, visibility 1; there is no place for times."""
+    """Write boxes with 9 columns, the class in the 8th and visibility 1; times are not written."""
     size = table.box[:, 2:] - table.box[:, :2]
     track = np.full(len(table), -1) if table.track_id is None else table.track_id
     boxes = np.hstack([table.box[:, :2] + FIRST, size]).tolist()

@@ -1,10 +1,11 @@
 """Detections from ROS bags: vision_msgs/Detection2DArray.
 
-A box is its center and size in pixels; whole numbers are taken for pixel centers counted from 0, as
-in CameraInfo; vision_msgs does not say. A turned box is refused. The best hypothesis gives class
-and score: a class that is a number is its id, others are numbered in the order of their names.
-``id`` (vision_msgs 4) or ``tracking_id`` is the track; ones that are no numbers are counted as they
-come. A frame is a message, its time that of the array's header.
+A box has its center and size in pixels. Whole numbers are assumed to be pixel centers counted from
+0, as in CameraInfo, because vision_msgs does not specify it. A rotated box is refused. The best
+hypothesis gives class and score. A class that is a number is the class id; other classes are
+numbered in the order of their names. ``id`` (vision_msgs 4) or ``tracking_id`` is the track; values
+that are not numbers are numbered in the order in which they occur. A frame is a message, and its
+time is that of the array's header.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ def read_detection_arrays(
     topic: str | None = None,
     progress: Progress = tell_nobody,
 ) -> DetectionTable:
-    """Read boxes, unchecked; names of ``classes`` go before the bag's."""
+    """Read boxes, unchecked; names of ``classes`` override the bag's."""
     frame, line, times, boxes, scores, labels, tracks = [], [], [], [], [], [], []
     for number, (where, message) in enumerate(messages(path, KIND, topic, progress)):
         for detection in message.detections:
@@ -70,7 +71,7 @@ def read_detection_arrays(
 
 
 def _hypothesis(result: Any) -> tuple[str, float]:
-    # vision_msgs 4 wraps what version 3 (string) and ROS 1 (int64) have beside the pose.
+    # vision_msgs 4 wraps the fields that version 3 (string) and ROS 1 (int64) have beside the pose.
     inner = getattr(result, "hypothesis", result)
     label = getattr(inner, "class_id", None)
     return str(inner.id if label is None else label), float(inner.score)
@@ -87,7 +88,7 @@ def _box(path: str | Path, where: str, bbox: Any) -> list[float]:
 
 
 def _numbered(labels: list[str], order: list[str]) -> NDArray[np.int64]:
-    """Turn labels into whole numbers: their own, or their place in the order; "" is none."""
+    """Turn labels into whole numbers: their value, or their place in the order; "" means none."""
     real = [label for label in order if label]
     if all(label.isdecimal() or label == str(NO_TRACK) for label in real):
         number = {label: int(label) for label in real}

@@ -1,7 +1,7 @@
 """Detections in memory, and the checks that all formats share.
 
-Boxes are corners in pixels of the image as recorded (distorted, where the lens does); whole numbers
-are pixel centers, the first pixel's is 0: the image spans [-0.5, width - 0.5].
+Boxes are corners in pixels of the image as recorded, with the distortion of the lens. Whole numbers
+are pixel centers, and the first pixel's center is 0, so the image spans [-0.5, width - 0.5].
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from dqslam.io.files import FileError
 
-# A box with no score, and one that no object has claimed.
+# The values for a box without a score and for one without an object.
 NO_SCORE = 1.0
 NO_TRACK = -1
 
@@ -22,7 +22,7 @@ NO_TRACK = -1
 class DetectionTable:
     """The rows of a detection file.
 
-    ``line`` (m,) where a row stands, from 1 (of a bag: the message);
+    ``line`` (m,) number of the row's line, or of the message in a bag, from 1;
     ``timestamp`` (m,) s; ``box`` (m, 4) px, u_min v_min u_max v_max;
     ``score`` (m,) 0..1; ``class_id``, ``track_id`` (m,), -1 for none, or None without that column;
     ``files`` (m,) the file of each row, where ``path`` is a folder of several.
@@ -53,9 +53,9 @@ class DetectionTable:
 def checked(
     table: DetectionTable, *, width: int | None, height: int | None, cut: bool
 ) -> DetectionTable:
-    """Refuse what is no box, score or sequence of times; cut boxes to the image if told so.
+    """Refuse invalid boxes, scores and sequences of times, and optionally cut boxes to the image.
 
-    Without ``width`` and ``height`` px of the image, or uncut, boxes may leave it.
+    Without ``width`` and ``height`` px of the image, or without cutting, boxes may leave it.
     """
     _check_shape(table)
     if cut and width is not None and height is not None:
@@ -75,14 +75,14 @@ def _check_shape(table: DetectionTable) -> None:
         row = int(empty[0])
         how = "inverted" if np.any(box[row, 2:] < box[row, :2]) else "empty"
         message = f"{how} box {_corners(box[row])}: x1 < x2, y1 < y2"
-        # One bad box is a slip, many are another format.
+        # A single bad box is an error in the file, many are another format.
         if empty.size > max(2, 0.1 * len(box)):
             message += f" ({empty.size} of {len(box)} boxes are so: are they x, y, width, height?)"
         raise table.error(row, message)
 
 
 def _inside(table: DetectionTable, width: int, height: int) -> NDArray[np.float64]:
-    """Cut boxes to the image, which spans half a pixel more than the centers of its pixels."""
+    """Cut boxes to the image, which extends half a pixel beyond the centers of its pixels."""
     box = table.box
     last = np.array([width, height]) - 0.5
     outside = np.flatnonzero(np.any((box[:, 2:] <= -0.5) | (box[:, :2] >= last), axis=1))

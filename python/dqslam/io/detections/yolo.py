@@ -1,10 +1,10 @@
-"""Detections as YOLO text: a file an image, a line ``class cx cy w h [score [id]]`` a box.
+"""Detections as YOLO text: one file per image, one line ``class cx cy w h [score [id]]`` per box.
 
-Center and size are shares of the image's width and height, which must be known, and count from the
-corner of the image: half a pixel is taken. The frame is what the file is named, see
-`dqslam.io.frames.frame_of`. Names of classes are those of ``classes``, of ``classes.txt`` (a line a
-class, from 0), of ``names`` in ``data.yaml``, or the number. Times are those of the frames, or of
-``frames.csv`` in the folder, which we write.
+Center and size are shares of the image's width and height, which must be known. They count from the
+corner of the image, so half a pixel is subtracted. The frame comes from the name of the file, see
+`dqslam.io.frames.frame_of`. Names of classes are those of ``classes``, else of ``classes.txt`` (one
+line per class, from 0), else of ``names`` in ``data.yaml``, else the number. Times are those of the
+frames, or of ``frames.csv`` in the folder, which we write.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ from dqslam.io.frames import FrameTimes, frame_of, frame_table, read_frame_times
 from dqslam.io.yaml import parse_yaml
 
 FIELDS = ("class", "cx", "cy", "w", "h", "score", "id")
-CORNER = 0.5  #: what YOLO's pixels are ahead of ours
+CORNER = 0.5  #: YOLO's pixel coordinates minus ours
 CLASSES, DATA, TIMES = "classes.txt", "data.yaml", "frames.csv"
-LARGEST_CLASS = 9999  #: classes.txt has a line for every number up to the largest
+LARGEST_CLASS = 9999  #: limits classes.txt, which has a line for every number up to the largest
 
 
 def read_yolo(
@@ -57,7 +57,7 @@ def read_yolo(
     columns = dict(zip(FIELDS, zip(*rows, strict=True), strict=True))
 
     def numbers(name: str) -> list[float]:
-        # One file after the other, so that an error names its own.
+        # Files are checked one after the other, so that an error names the right one.
         return [
             float(parse_numbers(file, name, [cell], [line])[0])
             for file, cell, line in zip(files, columns[name], lines, strict=True)
@@ -96,7 +96,7 @@ def read_yolo(
 def write_yolo(
     path: str | Path, table: DetectionTable, *, width: int, height: int, times: bool = True
 ) -> None:
-    """Write a folder that is not there yet: boxes, classes.txt, and frames.csv with their times."""
+    """Write a new folder with boxes, classes.txt, and frames.csv with their times."""
     names = dict(zip(table.class_id.tolist(), table.class_name, strict=True))
     if min(names) < 0 or max(names) > LARGEST_CLASS:
         wrong = min(names) if min(names) < 0 else max(names)
@@ -128,7 +128,7 @@ def _read_rows(
     for done, file in enumerate(box_files, start=1):
         progress(done / len(box_files))
         if not file.stat().st_size:
-            continue  # an image without boxes
+            continue  # an image without boxes has an empty file
         number = frame_of(file.name, frames)
         if number is None:
             raise FileError(file, "its name is no number of a frame, and in no --frame-times")

@@ -1,19 +1,19 @@
-"""Boxes of an estimate as CSV, one row a box: what was used, what was left out, what fits.
+"""Boxes of an estimate as CSV, one row per box: whether it was used, left out, and fits.
 
 ``timestamp``
-    Seconds, that of a pose of ``trajectory.txt``.
+    Seconds; it is the time of a pose in ``trajectory.txt``.
 ``x1 y1 x2 y2``
-    Corners in undistorted pixels, whole numbers at pixel centers.
+    Corners in undistorted pixels, with whole numbers at pixel centers.
 ``truncated``
-    The edges among ``x1 y1 x2 y2`` that are the border of the image, which the object leaves.
+    The edges among ``x1 y1 x2 y2`` at the border of the image, where it cuts the object.
 ``score class_id class_name``
-    What the detector said.
+    The output of the detector.
 ``object_id``
-    The object that the box was taken for, -1 for none.
+    The object that the box was assigned to, -1 for none.
 ``inlier``
-    1 where the box was used and fits the estimate.
+    1 if the box was used and fits the estimate.
 ``held_out``
-    1 where the box was kept from the estimator, to judge it by.
+    1 if the box was not given to the estimator, in order to evaluate it.
 """
 
 from __future__ import annotations
@@ -50,11 +50,11 @@ class BoxTable:
     """The rows of ``boxes.csv``."""
 
     pose: Ints
-    """Row of the pose it was seen from, shape (m,)."""
+    """Row of the pose from which it was observed, shape (m,)."""
     box: Floats
     """[u_min, v_min, u_max, v_max] in undistorted pixels, shape (m, 4)."""
     truncated: Bools
-    """Edges that are the border of the image, shape (m, 4)."""
+    """Whether each edge is at the border of the image, shape (m, 4)."""
     score: Floats
     """Shape (m,)."""
     class_id: Ints
@@ -62,11 +62,11 @@ class BoxTable:
     class_name: tuple[str, ...]
     """One per box."""
     object_id: Ints
-    """Object that the box was taken for, -1 for none; shape (m,)."""
+    """Object that the box was assigned to, -1 for none; shape (m,)."""
     inlier: Bools
     """Whether the box was used and fits, shape (m,)."""
     held_out: Bools
-    """Whether it was kept from the estimator, shape (m,)."""
+    """Whether the box was not given to the estimator, shape (m,)."""
 
     def __len__(self) -> int:
         """Return the number of boxes."""
@@ -76,7 +76,7 @@ class BoxTable:
 def write_boxes(
     path: str | Path, estimate: Estimate, detections: Detections, held_out: Bools | None
 ) -> None:
-    """Write the boxes; those with an object that were not held out are the estimate's inliers'."""
+    """Write the boxes; `estimate.inliers` has an entry for each with an object and not held out."""
     held_out = np.zeros(len(detections), dtype=np.bool_) if held_out is None else held_out
     used = (detections.object_id >= 0) & ~held_out
     if len(estimate.inliers) != used.sum():
@@ -109,7 +109,7 @@ def write_boxes(
 
 
 def read_boxes(path: str | Path, timestamps: Floats) -> BoxTable:
-    """Read the boxes that were seen from poses at these times, shape (n,)."""
+    """Read the boxes that were observed from poses at these times, shape (n,)."""
     table = read_csv(path, required=COLUMNS, allow_empty=True)
     time = table.numbers("timestamp")
     pose = np.searchsorted(timestamps, time).clip(max=len(timestamps) - 1)

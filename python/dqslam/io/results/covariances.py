@@ -1,11 +1,11 @@
-"""Covariances of an estimate's poses as CSV, a row for each pose whose covariance is known.
+"""Covariances of an estimate's poses as CSV, one row for each pose with a known covariance.
 
 ``timestamp``
-    Seconds, that of a pose of ``trajectory.txt``.
+    Seconds; it is the time of a pose in ``trajectory.txt``.
 ``c11 c12 .. c16 c22 .. c66``
-    The upper triangle of the covariance of the camera's pose in the frame of the camera: x y z of
-    its position [m], then of its rotation vector [rad]. The first pose is the gauge: it is exact,
-    and the others are relative to it.
+    The upper triangle of the covariance of the camera's pose in the frame of the camera, for x y
+    z of its position [m] and then of its rotation vector [rad]. The first pose is the gauge: it is
+    exact, and the others are relative to it.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ ENTRIES = tuple(f"c{row + 1}{column + 1}" for row, column in zip(_ROWS, _COLUMNS
 
 
 def write_covariances(path: str | Path, estimate: Estimate, covariances: Floats) -> None:
-    """Write those of the poses of a robot, shape (n, k, k), as they are for its camera; NaN: none.
+    """Write the covariances of a robot's poses, (n, k, k) or NaN, converted to those of its camera.
 
-    ``covariances`` is in the frames of the robot's poses, as ``uncertainty.Marginals`` has it.
+    ``covariances`` is in the frames of the robot's poses, as in ``uncertainty.Marginals``.
     """
     size = 3 if estimate.pose_model == _core.PoseModel.SE2 else 6
     count = len(estimate.timestamps)
@@ -42,7 +42,7 @@ def write_covariances(path: str | Path, estimate: Estimate, covariances: Floats)
 
 
 def write_rows(path: str | Path, timestamps: Floats, covariances: Floats) -> None:
-    """Write covariances (n, 6, 6) as they are, a row for each of the times (n,)."""
+    """Write covariances (n, 6, 6) unchanged, one row for each of the times (n,)."""
     lines = [",".join(("timestamp", *ENTRIES)) + "\n"]
     for time, covariance in zip(timestamps.tolist(), covariances, strict=True):
         entries = (f"{entry:.9g}" for entry in covariance[_ROWS, _COLUMNS])
@@ -51,7 +51,7 @@ def write_rows(path: str | Path, timestamps: Floats, covariances: Floats) -> Non
 
 
 def read_covariances(path: str | Path, timestamps: Floats) -> Floats:
-    """Read those of the poses at these times (n,), shape (n, 6, 6); NaN where there is none."""
+    """Read the covariances of poses at these times (n,), shape (n, 6, 6); NaN where missing."""
     table = read_csv(path, required=("timestamp", *ENTRIES), allow_empty=True)
     time = table.numbers("timestamp")
     pose = np.searchsorted(timestamps, time).clip(max=len(timestamps) - 1)

@@ -1,4 +1,4 @@
-"""Read back what ``save_estimate`` wrote."""
+"""Read the files that ``save_estimate`` wrote."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from dqslam.io.trajectory import read_trajectory
 
 @dataclass(frozen=True, eq=False)
 class MapObjects:
-    """The objects of ``map.json``, rows in its order."""
+    """The objects of ``map.json``, in its order."""
 
     object_ids: Ints
     """Shape (o,)."""
@@ -43,7 +43,7 @@ class MapObjects:
     log_semi_axes_sigmas: Floats
     """Of the natural logarithms of the semi-axes, shape (o, 3); NaN where unknown."""
     dropped: Mapping[int, str] = field(default_factory=dict)
-    """Ids of objects that were not mapped, and why."""
+    """Reason for each object that was not mapped, by its id."""
 
     def __len__(self) -> int:
         """Return the number of objects."""
@@ -75,7 +75,7 @@ class Results:
 
     directory: Path
     camera: _core.Camera
-    """Without the mount on the robot: the poses are the camera's."""
+    """The camera without a mount, because the poses are those of the camera."""
     timestamps: Floats
     """Seconds, shape (n,)."""
     poses: Floats
@@ -87,9 +87,9 @@ class Results:
     being exact; shape (n, 6, 6), NaN where unknown."""
     objects: MapObjects
     boxes: BoxTable | None
-    """None without ``boxes.csv``."""
+    """The boxes, or None without ``boxes.csv``."""
     report: Mapping[str, Any]
-    """``report.json``, empty without it."""
+    """The content of ``report.json``, empty without it."""
 
     def __repr__(self) -> str:
         """Show where the files are, and how many poses and objects are in them."""

@@ -18,7 +18,7 @@ from dqslam.recording import Detections
 
 
 class Covariances(Protocol):
-    """What ``uncertainty.Marginals`` has of the poses and the mapped objects."""
+    """The covariances of poses and mapped objects, as in ``uncertainty.Marginals``."""
 
     @property
     def poses(self) -> Floats:
@@ -37,7 +37,7 @@ def save_estimate(
     held_out: Bools | None = None,
     marginals: Covariances | None = None,
 ) -> None:
-    """Write an estimate into a directory, which is made if need be.
+    """Write an estimate into a directory, which is created if needed.
 
     ``trajectory.txt`` has the estimated and ``odometry.txt`` the initial poses, world_from_camera;
     ``map.json`` has the objects, and why others were dropped; ``camera.json`` the camera. Each file
@@ -46,10 +46,11 @@ def save_estimate(
     Parameters
     ----------
     detections
-        Boxes for ``boxes.csv``, edges on the border flagged: those that the estimator used, in the
-        order of ``estimate.inliers``, and any others between them, held out or of object -1.
+        Boxes for ``boxes.csv``, with flags of edges at the border. They are the boxes that the
+        estimator used, in the order of ``estimate.inliers``, and any others between them, which
+        were held out or have object -1.
     held_out
-        Which of them were kept from the estimator, shape (m,); none by default.
+        Whether each box was not given to the estimator, shape (m,); none by default.
     marginals
         Covariances of the mapped objects, for the ellipsoid model, and of the poses, for
         ``covariance.csv``.
@@ -78,7 +79,7 @@ def save_estimate(
     if detections is not None:
         write_boxes(directory / "boxes.csv", estimate, detections, held_out)
     else:
-        (directory / "boxes.csv").unlink(missing_ok=True)  # those of an estimate before this one
+        (directory / "boxes.csv").unlink(missing_ok=True)  # it may be from an earlier estimate
     if marginals is not None:
         write_covariances(directory / "covariance.csv", estimate, marginals.poses)
     else:
@@ -92,7 +93,7 @@ def _camera(camera: _core.Camera) -> dict[str, Any]:
 
 
 def _object(estimate: Estimate, row: int, marginals: Covariances | None) -> dict[str, Any]:
-    """Describe one object; a dual quadric that is no ellipsoid has a center, but null axes."""
+    """Describe one object; a dual quadric that is not an ellipsoid has a center, but null axes."""
     semi_axes, orientation = None, None
     if estimate.is_ellipsoid[row]:
         _, semi_axes, orientation = _core.axes_from_ellipsoid(estimate.ellipsoids[row])

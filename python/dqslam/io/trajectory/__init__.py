@@ -1,4 +1,4 @@
-"""Trajectories from files, one module a format; all become world_from_camera at times in s."""
+"""Trajectories from files, a module for each format; all become world_from_camera at times in s."""
 
 from __future__ import annotations
 
@@ -41,18 +41,18 @@ def read_trajectory(
     path
         A file, or the folder of a bag.
     format
-        One of TRAJECTORY_FORMATS; by default it is told by the look of the file.
+        One of TRAJECTORY_FORMATS; by default it is recognized from the file.
     frames
         Times of the frames, for a format that has none.
     body_from_camera
-        Pose (7,) of the camera in the body, m and x y z w, where the trajectory is the body's.
+        Pose (7,) of the camera in the body, m and x y z w, for the trajectory of a body.
     repeated_times
-        A time that comes again is left out instead of refused: motion capture at a high rate,
-        rounded to its last digit, has a few.
+        Whether to leave out a repeated time instead of refusing it. Motion capture at a high rate
+        has a few, because times are rounded.
     topic
-        Of a bag with several.
+        Topic of a bag that has several.
     progress
-        Told the share that is read, of a bag or a folder.
+        Called with the share of a bag or a folder that has been read.
     """
     chosen = choose_format(path, format, TRAJECTORY_FORMATS, "trajectory")
     options: dict[str, Any] = dict(topic_option(chosen.name, topic))

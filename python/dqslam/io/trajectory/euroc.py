@@ -1,9 +1,9 @@
 """EuRoC (ASL) trajectories: CSV lines ``t, px, py, pz, qw, qx, qy, qz``, more columns ignored.
 
 Time is a whole number of nanoseconds, the quaternion has w first, and the pose is world_from_body,
-where EuRoC's body is the IMU (``R_S``: sensor in reference frame). The camera is taken for the body
-unless ``body_from_camera`` is given to read_trajectory. The header is a comment.
-Seconds as floats hold today's time to 0.24 microseconds: nanoseconds do not come back exactly.
+where EuRoC's body is the IMU (``R_S``: sensor in reference frame). The camera is assumed to be the
+body unless ``body_from_camera`` is given to read_trajectory. The header is a comment.
+Seconds as floats hold today's time to 0.24 microseconds, so nanoseconds are not kept exactly.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from dqslam.io.trajectory.table import Trajectory, make_trajectory, parse_column
 FIELDS = ("p_x", "p_y", "p_z", "q_w", "q_x", "q_y", "q_z")
 HEADER = "#timestamp [ns]," + ",".join(FIELDS) + "\n"
 NANO = Decimal(10) ** 9
-SECOND = 10**9  #: what is smaller is no time in nanoseconds, but the number of a frame
+SECOND = 10**9  #: a smaller number is not a time in nanoseconds, but the number of a frame
 COMMONEST = (8, 17)  #: columns: the pose alone, and with velocity and biases
 
 
 def read_euroc(
     path: str | Path, *, frames: FrameTimes | None = None, repeated_times: bool = False
 ) -> Trajectory:
-    """Read an EuRoC trajectory, the body's; it has times of its own, ``frames`` are not asked."""
+    """Read an EuRoC trajectory of a body; ``frames`` are not used, because it has times."""
     rows, lines = read_rows(path)
     cells = [[cell.strip() for cell in row.split(",")] for row in rows]
     for row, line in zip(cells, lines, strict=True):

@@ -1,8 +1,8 @@
 """KITTI trajectories: 12 numbers a line, the rows of the 3 x 4 matrix [R t] world_from_camera.
 
-Meters; the camera's x points right, y down, z forward. The first line is frame 0, each next line
-one more: there are no times, see `dqslam.io.frames`. In KITTI's odometry benchmark the camera is
-number 0, the left gray one; boxes in the images of camera 2 are 6 cm beside it.
+Lengths are in meters; the camera's x points right, y down, z forward. Line i, from 0, is frame i.
+There are no times, see `dqslam.io.frames`. In KITTI's odometry benchmark the camera is number 0,
+the left gray one; camera 2 is 6 cm beside it.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from dqslam.io.frames import FrameTimes
 from dqslam.io.trajectory.table import Trajectory, make_trajectory, parse_columns
 
 FIELDS = tuple(f"r{row}{column}" for row in (1, 2, 3) for column in (1, 2, 3, 4))
-# KITTI's own files are rounded to 7 digits; more than this is no rotation.
+# KITTI's own files are rounded to 7 digits; a larger error means that it is not a rotation.
 ROTATION_TOLERANCE = 1e-3
 
 
@@ -55,7 +55,7 @@ def read_kitti(
 
 
 def write_kitti(path: str | Path, timestamps: ArrayLike, world_from_camera: ArrayLike) -> None:
-    """Write poses (n, 7) as KITTI matrices; times have no place."""
+    """Write poses (n, 7) as KITTI matrices, which have no times."""
     from scipy.spatial.transform import Rotation
 
     poses = np.asarray(world_from_camera, dtype=float)

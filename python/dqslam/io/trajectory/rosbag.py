@@ -1,8 +1,8 @@
 """Trajectories from ROS bags: nav_msgs/Odometry.
 
-A message's pose is that of its child frame in its parent frame, and is taken as world_from_camera.
-Mostly the child is the robot's base (x forward, z up): give ``body_from_camera`` then. Times are
-those of the headers, to 0.24 microseconds.
+A message's pose is that of its child frame in its parent frame, and is used as world_from_camera.
+Usually the child is the robot's base (x forward, z up), and ``body_from_camera`` must be given.
+Times are those of the headers, to 0.24 microseconds.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def read_odometry(
     topic: str | None = None,
     progress: Progress = tell_nobody,
 ) -> Trajectory:
-    """Read the odometry of a bag; it has times of its own, ``frames`` are not asked."""
+    """Read the odometry of a bag; ``frames`` are not used, because it has times."""
     times, rows = [], []
     for where, message in messages(path, KIND, topic, progress):
         p, q = message.pose.pose.position, message.pose.pose.orientation
@@ -39,7 +39,7 @@ def read_odometry(
         times.append(stamp_seconds(message))
     if not rows:
         raise FileError(path, f"holds no {KIND}")
-    # A bag's lines are its messages.
+    # The lines of a bag are its messages.
     return make_trajectory(
         path,
         np.array(times),

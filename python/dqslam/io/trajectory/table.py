@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from dqslam.io.files import FileError, parse_numbers
 
-# Files round quaternions to 4 digits, which costs up to 1e-4 of the norm; more is a mistake.
+# Files may round quaternions to 4 digits, which changes the norm by up to 1e-4; more is a mistake.
 NORM_TOLERANCE = 1e-3
-# What nine decimals cost; within it a quaternion keeps its digits.
+# The error of nine decimals; a quaternion with a smaller error is not normalized.
 ROUNDING = 2e-9
 
-# Beyond any place on Earth, in any frame: numbers of another unit, or of another column.
+# A larger coordinate is in another unit or column; no place on Earth has it, in any frame.
 LARGEST_COORDINATE = 1e8
 
 
@@ -30,7 +30,7 @@ class Trajectory(NamedTuple):
 def parse_columns(
     path: str | Path, names: Sequence[str], rows: Sequence[Sequence[str]], lines: Sequence[int]
 ) -> NDArray[np.float64]:
-    """Turn rows of as many cells as there are names into finite numbers, shape (n, names)."""
+    """Turn rows with one cell for each name into finite numbers, shape (n, names)."""
     columns = zip(names, zip(*rows, strict=True), strict=True)
     return np.column_stack([parse_numbers(path, name, cells, lines) for name, cells in columns])
 

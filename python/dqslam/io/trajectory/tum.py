@@ -1,4 +1,4 @@
-"""TUM trajectories: one line ``t tx ty tz qx qy qz qw`` a pose.
+"""TUM trajectories: one line ``t tx ty tz qx qy qz qw`` for each pose.
 
 The pose is world_from_camera: meters, unit quaternion x y z w, camera x right, y down, z forward.
 Time is in seconds and strictly increasing. Lines that start with # are comments.
@@ -22,7 +22,7 @@ FIELDS = ("t", "tx", "ty", "tz", "qx", "qy", "qz", "qw")
 def read_tum(
     path: str | Path, *, frames: FrameTimes | None = None, repeated_times: bool = False
 ) -> Trajectory:
-    """Read a TUM trajectory; it has times of its own, ``frames`` are not asked."""
+    """Read a TUM trajectory; ``frames`` are not used, because it has times."""
     rows, lines = read_rows(path)
     fields = [row.split() for row in rows]
     for row, line in zip(fields, lines, strict=True):
@@ -33,7 +33,7 @@ def read_tum(
 
 
 def write_tum(path: str | Path, timestamps: ArrayLike, world_from_camera: ArrayLike) -> None:
-    """Write poses (n, 7) at times (n,) as TUM text; the times come back to the last bit."""
+    """Write poses (n, 7) at times (n,) as TUM text; times are written without loss of a bit."""
     times = np.asarray(timestamps, dtype=float).tolist()
     poses = np.asarray(world_from_camera, dtype=float).tolist()
     write_text(
@@ -47,7 +47,7 @@ def write_tum(path: str | Path, timestamps: ArrayLike, world_from_camera: ArrayL
 
 def _looks(look: Look) -> bool:
     fields = look.first.split()
-    # A camera of COLMAP may have 8 fields as well, the second its model.
+    # A camera of COLMAP may have 8 fields as well; its second field is the model.
     return "," not in look.first and len(fields) == len(FIELDS) and not fields[1][0].isupper()
 
 

@@ -1,4 +1,4 @@
-"""Which estimator a trial runs, and what it is given."""
+"""The estimators that a trial runs, and their input."""
 
 from dataclasses import dataclass, field, replace
 from typing import Literal, get_args
@@ -19,18 +19,19 @@ RowName = Literal["monocular", "relative_position"]
 LOSSES: tuple[LossName, ...] = get_args(LossName)
 ROWS: tuple[RowName, ...] = ("monocular", "relative_position")
 
-# None has a lower mean RMSE_pos over seeds 0 to 19 with 20 % wrong ids, random and structured;
-# that of switchable is the same.
+# No other loss has a lower mean RMSE_pos over seeds 0 to 19 with 20 % wrong ids, random and
+# structured; switchable constraints have the same.
 ROBUST_LOSS: LossName = "gnc_gm"
 
 # The paper does not state the weight Lambda of its box residual. Every decade of its sigma, in
-# px^4 m^2, is tried from where boxes overrule odometry (worse than it) to where they do not count.
+# px^4 m^2, is tried: from values where boxes outweigh odometry, and the result is worse than
+# odometry, to values where boxes have no effect.
 ALGEBRAIC_SIGMAS = tuple(float(10.0**power) for power in range(7, 15))
 
 
 @dataclass(frozen=True)
 class Settings:
-    """What is run in each trial."""
+    """The settings of each trial."""
 
     method: Method = "dqslam"
     loss: LossName = "none"
@@ -38,7 +39,7 @@ class Settings:
     """Whether estimates are compared with the posterior bound and the optimum."""
 
     def __post_init__(self) -> None:
-        """Refuse what makes no sense."""
+        """Refuse settings that do not go together."""
         if self.loss not in LOSSES:
             raise ValueError(f"loss: {self.loss!r} is none of {', '.join(LOSSES)}")
         if self.method == "paper" and (self.bound or self.loss != "none"):
@@ -46,13 +47,13 @@ class Settings:
 
 
 def default_loss(scenario: Scenario, method: Method) -> LossName:
-    """Return a robust loss where ids are wrong, none elsewhere or in the paper's method."""
+    """Return a robust loss if ids are wrong, and none for right ids or the paper's method."""
     is_robust = scenario.detector.wrong_associations > 0.0 and method == "dqslam"
     return ROBUST_LOSS if is_robust else "none"
 
 
 def candidate_sigmas(method: Method) -> tuple[float | None, ...]:
-    """Return the algebraic sigmas that a method is run with; None: it has no such weight."""
+    """Return the algebraic sigmas that a method is run with; None if it has no such weight."""
     return ALGEBRAIC_SIGMAS if method == "paper" else (None,)
 
 
@@ -66,8 +67,8 @@ def method_options(settings: Settings, algebraic_sigma: float | None = None) -> 
         start=_core.Start.IDENTITY,
         schedule=_core.Schedule.BATCH,
         loss=_core.Loss.NONE,
-        # Ceres' dog-leg creeps where ours leaps, which from odometry alone reaches more drives; it
-        # is never worse than Levenberg-Marquardt here, and faster.
+        # With Ceres' dog-leg, solves from odometry succeed on fewer drives than with our own, but
+        # here it is never worse than Levenberg-Marquardt, and it is faster.
         backend=_core.Backend.CERES,
         minimizer=_core.Minimizer.DOGLEG,
         algebraic_sigma=algebraic_sigma,
@@ -76,7 +77,7 @@ def method_options(settings: Settings, algebraic_sigma: float | None = None) -> 
 
 @dataclass(frozen=True)
 class Beliefs:
-    """What is assumed of boxes and objects."""
+    """The assumptions about boxes and objects."""
 
     box_noise: BoxNoise = field(default_factory=BoxNoise)
     size_prior: SizePrior = field(default_factory=SizePrior)
@@ -87,10 +88,10 @@ class Beliefs:
 
 
 def beliefs(scenario: Scenario, settings: Settings) -> Beliefs:
-    """Return the defaults, or what is true where a bound needs it.
+    """Return the default assumptions, or the true ones if a bound needs them.
 
-    Covariances and their bound only mean something if the sigmas are right: for ellipsoids those
-    of the detector and of the world; cubes have no right ones.
+    Covariances and their bound are only meaningful if the sigmas are right. For ellipsoids these
+    are the sigmas of the detector and of the world; for cubes there are no right ones.
     """
     if settings.bound and scenario.objects == "ellipsoids":
         noise = BoxNoise(pixels=scenario.detector.edge_sigma_px, relative=0.0)
@@ -99,7 +100,7 @@ def beliefs(scenario: Scenario, settings: Settings) -> Beliefs:
 
 
 def true_size_prior(world: WorldSettings) -> SizePrior:
-    """Return mean and sigma of the logarithm of the semi-axes that a world's ellipsoids have."""
+    """Return mean and sigma of the logarithm of the semi-axes of a world's ellipsoids."""
     from scipy.stats import norm
 
     size = world.log_normal_size
@@ -117,5 +118,5 @@ def true_size_prior(world: WorldSettings) -> SizePrior:
 
 
 def seen_by(row: RowName, recording: Recording) -> Recording:
-    """Return what the estimator of a row is given."""
+    """Return the recording that the estimator of a row gets."""
     return recording if row == "relative_position" else replace(recording, positions=None)

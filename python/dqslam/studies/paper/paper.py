@@ -44,13 +44,13 @@ def run_paper(
     Parameters
     ----------
     loss
-        The robust loss on boxes; by default none, or one that suits where some ids are wrong.
+        The robust loss on boxes; by default none, or a suitable one if some ids are wrong.
     bound
-        Whether to compare with the posterior bound and the optimum, which takes some more solves.
-        The estimator is then told the true noise of the boxes and the true spread of the sizes,
-        where there are such (ellipsoids).
+        Whether to compare with the posterior bound and the optimum, which needs more solves.
+        For ellipsoids, the estimator then uses the true noise of the boxes and the true spread
+        of the sizes.
     jobs, backend, scheduler
-        Where trials run, as in `pool.run_each`. The numbers do not depend on it, times do.
+        Where trials run, as in `pool.run_each`. Only times depend on it.
     progress
         Called with (trials done, trials) after each.
     """
@@ -74,7 +74,7 @@ def _run_seed(seed: int, scenario: Scenario, settings: Settings) -> PaperTrial:
 
 
 def example_maps(table: PaperTable, count: int) -> list[tuple[str, Estimate, Truth]]:
-    """Solve the first monocular trials that succeeded again: title, estimate, truth of each."""
+    """Solve the first successful monocular trials again: title, estimate and truth of each."""
     row = table.best("monocular")
     options = method_options(table.settings, row.algebraic_sigma)
     believed = beliefs(table.scenario, table.settings)

@@ -1,4 +1,4 @@
-"""Scores beside plain errors: against the posterior bound, and of wrong associations."""
+"""Scores in addition to errors: against the posterior bound, and for wrong associations."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -22,39 +22,39 @@ from dqslam.uncertainty import (
     true_state,
 )
 
-# Half a chi-square of 0.1: estimates that differ by less are the same.
+# Estimates whose costs differ by less than half a chi-square of 0.1 are the same.
 SAME_COST = 0.05
 
 
 @dataclass(frozen=True)
 class BoundScore:
-    """An estimate beside what the data could give at best."""
+    """An estimate compared with the best that the data allow."""
 
     bound: float
     """Expected mean position error, meters."""
     last_pose_nees: float
-    """Squared error of the last pose in sigmas of its own covariance, by degrees of freedom."""
+    """Squared error of the last pose in sigmas of its covariance, per degree of freedom."""
     pose_nees: float
-    """The same, mean over all poses but the first, which is fixed."""
+    """Mean of the same quantity over all poses but the first, which is fixed."""
     pose_dof: int
     center_nees: float
-    """The same, mean over the centers of the mapped objects; 3 degrees of freedom."""
+    """Mean of the same quantity over the centers of the mapped objects (3 degrees of freedom)."""
     is_optimum: bool
-    """Whether a start at the truth ends no lower."""
+    """Whether a start at the truth does not reach a lower cost."""
 
 
 @dataclass(frozen=True)
 class RobustScore:
-    """How wrong ids were told from right ones, and what it would be worth to know them."""
+    """How well wrong ids were recognized, and the errors of a run that knows the right ones."""
 
     precision: float
     """Share of the boxes called inliers whose id is right."""
     recall: float
     """Share of the boxes with the right id that are called inliers."""
     oracle_rmse_pos: float
-    """Mean position error of the run that is told the right ones, meters."""
+    """Mean position error of the run that knows the right ids, meters."""
     oracle_rmse_landmark: float
-    """Mean error of its centers, of the objects that the estimate has too, meters."""
+    """Mean error of that run's centers, over the objects that the estimate also has, meters."""
     dropped: int
     """Objects that the estimate leaves out because too few boxes fit them."""
 
@@ -82,7 +82,7 @@ def score_bound(
         last_pose_nees=float(pose_nees[-1]),
         pose_nees=float(pose_nees.mean()),
         pose_dof=pose_error.shape[1],
-        center_nees=float(np.nanmean(center_nees)),  # NaN: nothing determines the object
+        center_nees=float(np.nanmean(center_nees)),  # NaN for an object that is undetermined
         is_optimum=bool(summary.final_cost <= from_truth.final_cost + SAME_COST),
     )
 
@@ -90,7 +90,7 @@ def score_bound(
 def score_robust(
     right_graph: Graph, right: Bools, truth: Truth, estimate: Estimate, options: SolveOptions
 ) -> RobustScore:
-    """Score which boxes fit, against which have the right id (b,); options: of the told run."""
+    """Score the inliers against the boxes with the right id (b,), with `options` of the oracle."""
     found = estimate.inliers & right
     told, _ = solve(right_graph, options)
     shared = told.object_ids[np.isin(told.object_ids, estimate.object_ids)]
@@ -114,10 +114,10 @@ def right_graph_of(recording: Recording, right: Bools, believed: Beliefs) -> Gra
 
 
 def summarize_bound(scores: Sequence[BoundScore], rmse_pos: Sequence[float]) -> dict[str, Any]:
-    """Average over trials; of an honest NEES the mean is 1, and in its interval in 95 % of cases.
+    """Average over trials; a consistent NEES has mean 1, and is in its interval in 95 % of cases.
 
-    The interval is that of one pose, or one object, a trial. A mean over all of them scatters less,
-    by how much depends on how they are correlated.
+    The interval is for one pose, or one object, in each trial. A mean over all of them scatters
+    less; how much less depends on their correlation.
     """
     if not scores:
         return {}

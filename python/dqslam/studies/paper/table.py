@@ -15,7 +15,7 @@ from dqslam.studies.paper.trial import PaperTrial, ScoredSolve
 
 METRICS = ("rmse_pos", "rmse_landmark", "rmse_volume")
 
-# [S&M17] table 1, (avg, med) of each metric.
+# [S&M17] table 1: (avg, med) of each metric.
 PAPER_ODOMETRY = (5.31, 4.03)
 PAPER_ROWS: dict[RowName, dict[str, tuple[float, float]]] = {
     "monocular": {
@@ -33,7 +33,7 @@ PAPER_ROWS: dict[RowName, dict[str, tuple[float, float]]] = {
 
 @dataclass(frozen=True)
 class Statistics:
-    """Of one metric over the trials that succeeded; NaN when none did."""
+    """Statistics of one metric over the trials that succeeded; NaN if none did."""
 
     avg: float
     med: float
@@ -53,19 +53,19 @@ class TableRow:
 
     algebraic_sigma: float | None
     metrics: dict[str, Statistics]
-    """By the names in METRICS; meters, meters, cubic meters."""
+    """Statistics by the names in METRICS, in meters, meters and cubic meters."""
     volume_relative_error: Statistics
-    """Of our own estimate of volume, over the objects of all trials."""
+    """Statistics of our own estimate of volume, over the objects of all trials."""
     seconds_med: float
     failures: dict[int, str]
-    """Why a trial failed, by its seed."""
+    """The reason why a trial failed, by its seed."""
     worse_than_odometry: tuple[int, ...] = ()
-    """Seeds of the trials whose positions are further off than those of odometry alone."""
+    """Seeds of the trials whose positions have a larger error than odometry alone."""
     scores: dict[str, Any] = field(default_factory=dict)
-    """What the bound and wrong ids add, by name; of the trials that succeeded."""
+    """Scores for the bound and for wrong ids, by name, over the trials that succeeded."""
 
     def as_dict(self) -> dict[str, Any]:
-        """Lay out the row as plain data."""
+        """Return the row as plain data."""
         volume = self.volume_relative_error
         return {
             **{metric: asdict(self.metrics[metric]) for metric in METRICS},
@@ -79,7 +79,7 @@ class TableRow:
 
 @dataclass(frozen=True)
 class PaperTable:
-    """The paper's table 1 for one method, and the scan it was chosen from."""
+    """The paper's table 1 for one method, and the scan from which its rows were chosen."""
 
     seeds: tuple[int, ...]
     scenario: Scenario
@@ -95,7 +95,7 @@ class PaperTable:
         return self.settings.method
 
     def best(self, row: RowName) -> TableRow:
-        """Return the row with the fewest failures, among these the least mean RMSE_pos."""
+        """Return the row with the fewest failures, and of equals the least mean RMSE_pos."""
         return min(
             self.scan[row],
             key=lambda one: (
@@ -105,7 +105,7 @@ class PaperTable:
         )
 
     def as_dict(self) -> dict[str, Any]:
-        """Lay out the table as plain data, for JSON; the scan is there when there is a choice."""
+        """Return the table as plain data for JSON; it has the scan if there is a choice."""
         table: dict[str, Any] = {
             "trials": len(self.seeds),
             "seed": self.seeds[0],

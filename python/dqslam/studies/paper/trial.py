@@ -35,13 +35,13 @@ class ScoredSolve:
 
     report: Report | None
     seconds: float
-    """Wall clock of building and solving the problem."""
+    """Wall-clock time to build and solve the problem."""
     failure: str = ""
     bound: BoundScore | None = None
     robust: RobustScore | None = None
-    """Where some ids are wrong."""
+    """The score of the robust loss if some ids are wrong."""
     iterations: int = 0
-    """Of all stages of the solver."""
+    """Iterations of all stages of the solver."""
     converged: bool = False
 
 
@@ -95,7 +95,7 @@ def solve_and_score(
     Parameters
     ----------
     told
-        Options of the run that is told which ids are right, without a loss; where some are wrong.
+        If some ids are wrong: options of the run that knows the right ones and has no loss.
     bound
         Whether to compare with the posterior bound and the optimum too.
     """
@@ -122,6 +122,6 @@ def solve_and_score(
             iterations=summary.iterations,
             converged=summary.converged,
         )
-    except Exception as error:  # whatever it was: counted, shown and never dropped
+    except Exception as error:  # any error is counted and shown
         seconds = time.perf_counter() - start if seconds is None else seconds
         return ScoredSolve(None, seconds, f"{type(error).__name__}: {error}")

@@ -1,6 +1,6 @@
-"""Many items, side by side: in this process, in others of this machine, or on a cluster.
+"""Process many items in this process, in other processes of this machine, or on a cluster.
 
-What an item gives must not depend on where it runs; then all backends give the same.
+The result of an item must not depend on where it runs; then all backends give the same results.
 """
 
 import os
@@ -25,27 +25,30 @@ def run_each(
     backend: Backend | None = None,
     scheduler: str | None = None,
 ) -> Generator[Result, None, None]:
-    """Return a generator of function(item) of all items: each once, in the order they finish.
+    """Return a generator of function(item) for all items, each once, in the order they finish.
 
-    Close it (`contextlib.closing`) to stop at once; an error and Ctrl-C do so too.
+    Closing it (`contextlib.closing`) stops at once; so do an error and Ctrl-C.
 
     Parameters
     ----------
     function
-        Picklable, of a module that the other processes can import, unless it runs in this one.
+        It must be picklable and in a module that the other processes can import, unless it runs
+        in this process.
     jobs
-        Processes of this machine, by default one per core; 1 needs no other. A cluster has its own.
+        Number of processes on this machine, by default one per core. It does not apply to a
+        cluster.
     backend
-        serial: in this process; processes: others, by the standard library; loky: others, by
-        joblib; dask, ray: a cluster. By default loky where joblib is installed, else processes.
+        "serial" runs in this process, "processes" in others by the standard library, "loky" in
+        others by joblib, "dask" and "ray" on a cluster. The default is "loky" if joblib is
+        installed, else "processes".
     scheduler
-        Where the cluster is: tcp://host:8786 of dask, without which one starts on this machine;
-        an address as `ray.init` takes it.
+        Address of the cluster: tcp://host:8786 for dask, or an address for `ray.init`. Without
+        it, a cluster is started on this machine.
 
     Raises
     ------
     ValueError
-        When the backend is unknown or not installed, or does not go with the other settings.
+        If the backend is unknown or not installed, or does not fit the other settings.
     """
     if jobs is not None and jobs < 1:
         raise ValueError(f"jobs: expected 1 or more, got {jobs}")

@@ -10,8 +10,8 @@ from dqslam.studies.pool.processes import interrupts_held
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
-# Results of ray come a chunk at a time: long enough that its workers seldom wait for the last of
-# one, short enough that a sweep which is stopped loses little.
+# Results of ray come in chunks. A chunk is so long that workers seldom wait for its last item, and
+# so short that a sweep which is stopped loses little.
 _RAY_CHUNK = 8  # items of each processor
 
 
@@ -20,8 +20,8 @@ def run_in_dask(
 ) -> Generator[Result, None, None]:
     """Yield results as the workers of a scheduler, or new ones of this machine, finish them.
 
-    What a lost worker had at hand is done by another. This is dask without joblib, whose backend
-    waits for ever when an item ends every worker that takes it.
+    If a worker is lost, another one takes over its items. This uses dask without joblib, because
+    joblib's backend waits for ever if an item ends every worker that takes it.
 
     Raises
     ------
@@ -35,7 +35,7 @@ def run_in_dask(
     with ExitStack() as stack:
         if scheduler is None:
             here = {"n_workers": jobs, "threads_per_worker": 1, "dashboard_address": None}
-            with interrupts_held():  # workers leave Ctrl-C to this process, which ends them
+            with interrupts_held():  # workers ignore Ctrl-C; this process ends them
                 where: Any = stack.enter_context(LocalCluster(**here))
         else:
             where = scheduler

@@ -26,10 +26,10 @@ def run_in_loky(
         with interrupts_held():  # until processes have started
             results = parallel(delayed(function)(item) for item in items)
     try:
-        # "yield from" would hand a stop on to joblib, past what is below.
+        # "yield from" would pass a stop on to joblib and skip the code below.
         for result in results:  # noqa: UP028
             yield result
     finally:
-        with warnings.catch_warnings():  # of results that nobody takes: that is what a stop means
+        with warnings.catch_warnings():  # joblib warns of results that nobody takes
             warnings.simplefilter("ignore")
             results.close()

@@ -13,7 +13,7 @@ from typing import TypeVar
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
-# Items are what runs side by side: threads within them would only get in each other's way.
+# Items already run in parallel, so threads within them would only slow each other down.
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
 
@@ -23,13 +23,13 @@ def run_in_processes(
     """Yield results as processes finish them."""
     executor = ProcessPoolExecutor(
         jobs,
-        # Spawned, not forked: the parent may hold locks of threads that a fork would not copy.
+        # Processes are spawned, not forked: the parent may hold locks of threads that a fork lacks.
         multiprocessing.get_context("spawn"),
         end_with_parent,
         initargs=(os.getpid(),),
     )
     try:
-        # Interrupted while they start, before `end_with_parent`, processes would say much.
+        # Processes that are interrupted while they start, before `end_with_parent`, print a lot.
         with interrupts_held(), _environment(ONE_THREAD):
             futures = [executor.submit(function, item) for item in items]
         for future in as_completed(futures):
@@ -40,8 +40,8 @@ def run_in_processes(
 
 @contextmanager
 def interrupts_held() -> Iterator[None]:
-    """Put off Ctrl-C in this thread, and keep it from the processes that it starts."""
-    multiprocessing.resource_tracker.ensure_running()  # when it starts, it lets Ctrl-C in again
+    """Delay Ctrl-C in this thread, and keep it from the processes that it starts."""
+    multiprocessing.resource_tracker.ensure_running()  # its start would enable Ctrl-C again
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
@@ -51,7 +51,7 @@ def interrupts_held() -> Iterator[None]:
 
 @contextmanager
 def _environment(changes: Mapping[str, str]) -> Iterator[None]:
-    """Set the variables that have no value yet, for a while."""
+    """Set the variables that have no value yet, while inside."""
     added = {name: value for name, value in changes.items() if name not in os.environ}
     os.environ.update(added)
     try:
@@ -62,9 +62,9 @@ def _environment(changes: Mapping[str, str]) -> Iterator[None]:
 
 
 def end_with_parent(parent: int) -> None:
-    """Let Ctrl-C end this process at once and in silence, and the end of its parent, a process id.
+    """Let Ctrl-C and the end of the parent (a process id) end this process at once, silently.
 
-    Ctrl-C is left alone where the parent ignores it.
+    Ctrl-C is ignored if the parent ignores it.
     """
     if signal.getsignal(signal.SIGINT) != signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.SIG_DFL)
@@ -73,7 +73,7 @@ def end_with_parent(parent: int) -> None:
 
 
 def _outlive(parent: int) -> None:
-    """End this process soon after its parent, which may be killed without a word."""
+    """End this process soon after its parent, which may be killed without notice."""
     while os.getppid() == parent:
         time.sleep(1.0)
     os._exit(1)

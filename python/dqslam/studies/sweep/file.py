@@ -1,4 +1,4 @@
-"""The file of a sweep: which settings are varied, and the cells that come of it."""
+"""The file of a sweep: the settings that are varied, and the resulting cells."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ from dqslam.studies.sweep.varied import (
 
 @dataclass(frozen=True)
 class Cell:
-    """One combination of values: what differs from other cells, and all the settings."""
+    """One combination of values: the settings that differ between cells, and all settings."""
 
     values: Mapping[str, Any]
-    """Of each varied setting, by its dotted name."""
+    """Value of each varied setting, by its dotted name."""
     settings: TrialSettings
 
 
@@ -40,7 +40,7 @@ class Sweep:
     """Cells, each to be run with the same seeds."""
 
     scenario: str
-    """Name of the scenario that all cells are variations of."""
+    """Name of the scenario that all cells vary."""
     cells: tuple[Cell, ...]
     seeds: tuple[int, ...]
 
@@ -51,16 +51,16 @@ class Sweep:
 
 
 class _File(FileModel):
-    """What a file may say at its top; its tables are checked setting by setting."""
+    """The settings at the top of a file; its tables are checked setting by setting."""
 
     scenario: str
     trials: Annotated[int, Field(ge=1)] = 50
-    """Seeds of each cell."""
+    """Number of seeds of each cell."""
     seed: Annotated[int, Field(ge=0)] = 0
-    """The first of them."""
+    """The first seed."""
     bound: bool = False
     samples: Annotated[int, Field(ge=1)] = 1
-    """Random samples, each crossed with the whole grid."""
+    """Number of random samples, each combined with the whole grid."""
     sample_seed: Annotated[int, Field(ge=0)] = 0
     fixed: dict[str, Any] = {}
     grid: dict[str, Any] = {}
@@ -73,8 +73,8 @@ def load_sweep(path: str | Path) -> Sweep:
     Raises
     ------
     FileError
-        When the file, or the scenario that it names, is missing or is none; with every wrong
-        setting and value, and the line of each.
+        If the file, or the scenario that it names, is missing or invalid; the error lists every
+        wrong setting and value with its line.
     """
     file = read_toml(path)
     mistakes: list[FileError] = []
@@ -97,13 +97,13 @@ def load_sweep(path: str | Path) -> Sweep:
         else:
             varied = {name: value for name, value in values.items() if name not in fixed}
             cells.append(Cell(varied, settings))
-    if mistakes or scenario is None:  # a wrong value makes one in each cell
+    if mistakes or scenario is None:  # a wrong value makes a mistake in each cell
         raise FileErrors(list({str(mistake): mistake for mistake in mistakes}.values()))
     return Sweep(scenario.name, tuple(cells), tuple(range(said.seed, said.seed + said.trials)))
 
 
 def _top(file: TomlFile, mistakes: list[FileError]) -> _File:
-    """Check the top; for what is wrong there the default stands in, so that the rest is checked."""
+    """Check the top; a default replaces a wrong setting, so that the rest is checked too."""
     try:
         return check_model(_File, file.content, file)
     except FileErrors as error:
@@ -112,9 +112,9 @@ def _top(file: TomlFile, mistakes: list[FileError]) -> _File:
 
 
 def _scenario(file: TomlFile, said: _File, mistakes: list[FileError]) -> Scenario | None:
-    """Load the scenario; None where it is wrong."""
+    """Load the scenario; return None if it is wrong."""
     if not isinstance(file.content.get("scenario"), str):
-        return None  # as was said of the top
+        return None  # the mistake at the top is reported already
     beside = file.path.parent / said.scenario
     try:
         return load_scenario(beside if beside.is_file() else said.scenario)
@@ -130,7 +130,7 @@ def _scenario(file: TomlFile, said: _File, mistakes: list[FileError]) -> Scenari
 def _refuse_unknown(
     file: TomlFile, scenario: Scenario | None, said: _File, mistakes: list[FileError]
 ) -> None:
-    """Refuse misspelt names whose values are wrong too, which are part of no cell."""
+    """Refuse misspelled names that are in no cell because their values are wrong too."""
     for table in ("grid", "random"):
         for name, place, value in leaves((table,), getattr(said, table)):
             content, as_cell = _cell(file, said, scenario, {name: value}, {name: place})
@@ -146,7 +146,7 @@ def _cell(
 ) -> tuple[dict[str, Any], CellFile]:
     """Put values into the settings of a scenario and of the default estimator.
 
-    Without a scenario its settings are left out: nobody knows which are right.
+    Without a scenario its settings are left out, because they cannot be checked.
     """
     if scenario is None:
         scenario = load_scenario("paper")

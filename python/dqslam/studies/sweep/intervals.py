@@ -9,9 +9,10 @@ Interval = tuple[float, float]
 
 
 def mean_interval(values: Sequence[float]) -> Interval | None:
-    """Return Student's t interval: exact for a normal quantity, else for many values; None for one.
+    """Return Student's t interval, or None for a single value.
 
-    An interval of errors that are skewed is symmetric nonetheless, and may reach below zero.
+    It is exact for a normal quantity, and for others if there are many values. It is symmetric even
+    for skewed errors, and may then reach below zero.
     """
     from scipy.stats import t
 
@@ -24,10 +25,10 @@ def mean_interval(values: Sequence[float]) -> Interval | None:
 
 
 def median_interval(values: Sequence[float]) -> Interval | None:
-    """Return the narrowest pair of order statistics, as far from either end, that holds the median.
+    """Return the narrowest symmetric pair of order statistics that holds the median.
 
-    Whatever the distribution: each value is below its median with probability 1/2, so that the
-    number below is binomial. None for fewer than 6 values, which no pair of them is sure of.
+    It is valid for any distribution: each value is below the median with probability 1/2, so the
+    number below it is binomial. It is None for fewer than 6 values, where no pair reaches 95 %.
     """
     from scipy.stats import binom
 
@@ -40,7 +41,7 @@ def median_interval(values: Sequence[float]) -> Interval | None:
 
 
 def share_interval(count: int, total: int) -> Interval | None:
-    """Return Wilson's interval of a probability of which `count` of `total` cases came true."""
+    """Return Wilson's interval of a probability, for `count` events in `total` cases."""
     from scipy.stats import binomtest
 
     if total == 0:

@@ -1,4 +1,4 @@
-"""Run what is missing of a sweep, and tabulate all of it."""
+"""Run the missing trials of a sweep, and tabulate all of it."""
 
 from collections.abc import Callable
 from contextlib import closing
@@ -19,17 +19,17 @@ Progress = Callable[[int, int], None]
 
 @dataclass(frozen=True)
 class SweepRun:
-    """What a sweep gave, and how much of it was there already."""
+    """The result of a sweep, and the number of trials that were finished before."""
 
     summary: SweepSummary
     done: int
-    """Trials that were run now."""
+    """Number of trials that were run now."""
     found: int
-    """Trials that an earlier run had finished."""
+    """Number of trials that an earlier run had finished."""
     failures: dict[str, str]
     """Errors of the trials that failed, by the names of their files without the suffix."""
     files: tuple[Path, ...]
-    """What was written beside the trials."""
+    """The files that were written in addition to the trials."""
 
 
 def run_sweep(
@@ -41,10 +41,10 @@ def run_sweep(
     scheduler: str | None = None,
     progress: Progress | None = None,
 ) -> SweepRun:
-    """Run each trial of a sweep that is not in the folder yet, keep it there, and tabulate all.
+    """Run each trial of a sweep that is not in the folder yet, store it there, and tabulate all.
 
-    Stopped or killed, it goes on from there when it is called again. A changed file runs what is
-    new in it; trials that it no longer has stay, and are not tabulated.
+    If it is stopped or killed, the next call continues. After a change of the file, only new trials
+    are run; trials that the file no longer has remain in the folder, but are not tabulated.
 
     Parameters
     ----------
@@ -53,14 +53,14 @@ def run_sweep(
     jobs, backend, scheduler
         Where trials run, as in `pool.run_each`. The results do not depend on it.
     progress
-        Called with (trials finished, trials) after each, those that were there among them.
+        Called with (trials finished, trials) after each; trials of earlier runs count.
 
     Raises
     ------
     FileError
-        When the folder cannot be written, or has trials of another version of dqslam.
+        If the folder cannot be written, or has trials of another version of dqslam.
     RuntimeError
-        When a worker has another version of dqslam, or a trial ends the process that runs it.
+        If a worker has another version of dqslam, or a trial ends the process that runs it.
     """
     store = Store(folder)
     cells = [cell_key(cell.settings) for cell in sweep.cells]

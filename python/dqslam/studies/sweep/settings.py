@@ -1,4 +1,4 @@
-"""What a trial of a sweep is made of: a scenario, and an estimator in words for a file."""
+"""The settings of a trial of a sweep: a scenario, and an estimator, as a file has them."""
 
 from dataclasses import asdict
 from enum import Enum
@@ -27,17 +27,17 @@ class _Settings(BaseModel):
 
 
 class BoxNoiseSettings(_Settings):
-    """`BoxNoise`, of what a file says and its defaults."""
+    """The settings of `BoxNoise` in a file; the defaults are its own."""
 
     pixels: Annotated[float, Field(gt=0.0)] = BoxNoise.pixels
     relative: Annotated[float, Field(ge=0.0)] = BoxNoise.relative
 
 
 class SizePriorSettings(_Settings):
-    """A size prior, in the words of a table of size priors."""
+    """A size prior, with the keys of a table of size priors."""
 
     median_m: Annotated[float, Field(gt=0.0)]
-    """Median semi-axis."""
+    """Median semi-axis, meters."""
     spread: Annotated[float, Field(gt=1.0)]
     """Two of three semi-axes are between median / spread and median * spread."""
 
@@ -45,13 +45,13 @@ class SizePriorSettings(_Settings):
 class _Estimator(_Settings):
     method: Method = "dqslam"
     input: RowName = "monocular"
-    """Boxes alone, or measured positions of the objects too."""
+    """Whether the estimator gets boxes alone, or measured positions of the objects too."""
     box_noise: BoxNoiseSettings | None = None
     size_prior: SizePriorSettings | None = None
 
 
 def _solver_settings() -> dict[str, Any]:
-    """Return a field for each option of the solver; None is its own default, or the method's."""
+    """Return a field for each option of the solver; None means the default of solver or method."""
     defaults = SolveOptions()
     fields: dict[str, Any] = {}
     for name in [name for name in dir(defaults) if not name.startswith("_")]:
@@ -62,14 +62,14 @@ def _solver_settings() -> dict[str, Any]:
     return fields
 
 
-# The core owns its options: their names and kinds come from there.
+# The core owns its options, so their names and types come from there.
 Estimator = create_model(
     "Estimator", __base__=_Estimator, __module__=__name__, **_solver_settings()
 )
 
 
 class TrialSettings(_Settings):
-    """All that a trial depends on, except its seed."""
+    """Everything that a trial depends on, except its seed."""
 
     scenario: Scenario
     estimator: Estimator = Estimator()
@@ -100,7 +100,7 @@ class TrialSettings(_Settings):
         return self.estimator.input
 
     def options(self, *, loss: LossName | None = None) -> SolveOptions:
-        """Return the options of the solver, with that loss instead of the one chosen if given."""
+        """Return the options of the solver; a given loss replaces the chosen one."""
         chosen = Settings(self.estimator.method, loss or self._loss)
         options = method_options(chosen, self._solver("algebraic_sigma"))
         for name in [name for name in _SOLVER_NAMES if name != "loss"]:
@@ -111,7 +111,7 @@ class TrialSettings(_Settings):
         return options
 
     def believed(self) -> Beliefs:
-        """Return what is assumed of boxes and objects."""
+        """Return the assumptions about boxes and objects."""
         default = beliefs(self.scenario, Settings(self.estimator.method, bound=self.bound))
         noise, prior = self.estimator.box_noise, self.estimator.size_prior
         return Beliefs(

@@ -1,7 +1,7 @@
-"""The directory of a sweep: one file per finished trial, written whole, hence what is resumed.
+"""The directory of a sweep: one file per finished trial, from which a sweep is resumed.
 
-DIR/cells/KEY.json        the settings of a cell, in full
-DIR/trials/KEY_SEED.json  what came of one trial of it
+DIR/cells/KEY.json        all settings of a cell
+DIR/trials/KEY_SEED.json  the result of one trial of the cell
 """
 
 import json
@@ -18,7 +18,7 @@ from dqslam.studies.sweep.trial import TrialResult
 class Store:
     """Finished trials in a directory.
 
-    A trial depends on nothing but what names its file: whoever writes one again writes the same.
+    A trial depends only on the parts of its file name, so writing it again writes the same.
     """
 
     def __init__(self, folder: str | Path) -> None:
@@ -36,16 +36,16 @@ class Store:
             write_json(path, {"scenario_name": settings.scenario.name} | settings.in_full())
 
     def save(self, result: TrialResult) -> None:
-        """Keep a finished trial."""
+        """Write a finished trial."""
         write_json(self._path(result.key), asdict(result))
 
     def finished(self, keys: Collection[str]) -> dict[str, TrialResult]:
-        """Return the finished ones of some trials; what cannot be read is not finished.
+        """Return the finished ones of some trials; a trial that cannot be read is not finished.
 
         Raises
         ------
         FileError
-            When one is of another version of dqslam: it does not mix with those to come.
+            If one is of another version of dqslam, because versions must not be mixed.
         """
         here = {path.stem for path in (self.folder / "trials").glob("*.json")}
         found = {}
@@ -64,7 +64,7 @@ class Store:
 
 
 def _read(path: Path) -> TrialResult | None:
-    """Read a trial; a file that a crash of the whole machine left empty is None."""
+    """Read a trial; return None for a file that a crash of the machine left empty."""
     try:
         return TrialResult(**json.loads(path.read_text(encoding="utf-8")))
     except (OSError, ValueError, TypeError):

@@ -1,4 +1,4 @@
-"""What a sweep shows: the metrics of each cell, with confidence intervals."""
+"""The summary of a sweep: the metrics of each cell, with confidence intervals."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -33,7 +33,7 @@ class Spread:
 
     @classmethod
     def of(cls, values: Sequence[float]) -> Self:
-        """Summarize values, at least one."""
+        """Summarize one or more values."""
         return cls(
             count=len(values),
             mean=float(np.mean(values)),
@@ -46,7 +46,7 @@ class Spread:
 
 @dataclass(frozen=True)
 class Share:
-    """How many trials of a cell something holds for."""
+    """The share of the trials of a cell for which something is true."""
 
     count: int
     share: float | None
@@ -64,13 +64,13 @@ class CellSummary:
 
     key: str
     values: Mapping[str, Any]
-    """Of the varied settings, by their dotted names."""
+    """Values of the varied settings, by their dotted names."""
     trials: int
     failed: Share
     metrics: dict[str, Spread]
-    """Of the trials that succeeded, by the names in METRICS."""
+    """Metrics of the trials that succeeded, by the names in METRICS."""
     shares: dict[str, Share]
-    """Of the same trials, by the names in YES_OR_NO."""
+    """Shares of the same trials, by the names in YES_OR_NO."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ class SweepSummary:
     cells: tuple[CellSummary, ...]
 
     def as_dict(self) -> dict[str, Any]:
-        """Lay out the summary as plain data, for JSON."""
+        """Return the summary as plain data for JSON."""
         shown = [name for name in METRICS if any(name in cell.metrics for cell in self.cells)]
         return {
             "dqslam_version": version(),

@@ -1,4 +1,4 @@
-"""Every trial of a sweep as one row: results.csv, and results.parquet where pyarrow is there."""
+"""Every trial of a sweep as one row: results.csv, and results.parquet if pyarrow is installed."""
 
 import csv
 import io
@@ -18,8 +18,8 @@ def write_results(
 ) -> list[Path]:
     """Write the results of each cell, cells by their keys, and return the files.
 
-    Columns: cell, the varied settings by their dotted names, seed, the metrics that any trial has,
-    failure. Nothing in them depends on where a trial ran, or how long it took.
+    The columns are: cell, the varied settings by their dotted names, seed, the metrics that any
+    trial has, failure. They do not depend on where a trial ran or how long it took.
     """
     columns = _columns(sweep, keys, results)
     path = folder / "results.csv"
@@ -48,7 +48,7 @@ def _columns(
 
 
 def _plain(value: Any) -> Any:
-    """Return what a cell of a table can hold: lists become JSON."""
+    """Return a value that a cell of a table can hold; lists become JSON."""
     return json.dumps(value) if isinstance(value, list | dict) else value
 
 

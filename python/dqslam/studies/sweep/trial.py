@@ -12,7 +12,7 @@ from dqslam.simulation.simulator import simulate
 from dqslam.studies.paper import ScoredSolve, seen_by, solve_and_score
 from dqslam.studies.sweep.settings import TrialSettings
 
-# What a trial measures, and the unit; "" is a share, a count, or yes and no as 1 and 0.
+# The metrics of a trial with their units; "" is for a share, a count, or yes and no as 1 and 0.
 METRICS = {
     "odometry_rmse_pos": "m",
     "rmse_pos": "m",
@@ -37,7 +37,7 @@ METRICS = {
     "oracle_rmse_landmark": "m",
     "dropped": "",
 }
-# Those that are 1 or 0 in each trial.
+# The metrics that are 1 or 0 in each trial.
 YES_OR_NO = ("converged", "worse_than_odometry", "is_optimum")
 
 
@@ -52,18 +52,18 @@ class Task:
 
 @dataclass(frozen=True)
 class TrialResult:
-    """What came of a trial: the same wherever it runs, but for the time."""
+    """The result of a trial; all but the time is the same wherever it runs."""
 
     key: str
     seed: int
     version: str | None
-    """Of dqslam, where the trial ran."""
+    """Version of dqslam with which the trial ran."""
     seconds: float
-    """Wall clock."""
+    """Wall-clock time."""
     metrics: dict[str, float | None]
-    """By the names in METRICS, those that there are; None is no finite number."""
+    """The measured metrics, by the names in METRICS; None if a value is not finite."""
     failure: str = ""
-    """The error, if it failed; there are no metrics then."""
+    """The error if the trial failed; it has no metrics then."""
 
 
 def cell_key(settings: TrialSettings) -> str:
@@ -78,7 +78,7 @@ def trial_key(cell: str, seed: int) -> str:
 
 
 def run_task(task: Task) -> TrialResult:
-    """Run a trial; whatever error it ends with is kept."""
+    """Run a trial; an error becomes its failure."""
     start = time.perf_counter()
     metrics: dict[str, float | None] = {}
     try:

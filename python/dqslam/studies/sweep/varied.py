@@ -1,4 +1,4 @@
-"""Which settings of a sweep are varied, and by which values: tables of a file into combinations."""
+"""The varied settings of a sweep and their values: from tables of a file to combinations."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ Location = tuple[str | int, ...]
 
 
 class FileModel(BaseModel):
-    """What a sweep's file may say; nothing else, and no infinity."""
+    """The settings that a sweep's file may have; other keys and infinity are refused."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 class Range(FileModel):
-    """Between which numbers a setting is drawn."""
+    """The range from which a setting is drawn."""
 
     low: float
     high: float
     log: bool = False
-    """Whether the logarithm is uniform."""
+    """Whether the logarithm is uniform, not the value."""
     whole: bool = False
-    """Whether numbers are whole, both ends among them."""
+    """Whether values are whole numbers, both ends included."""
 
     @model_validator(mode="after")
     def _is_a_range(self) -> Self:
@@ -44,7 +44,7 @@ class Range(FileModel):
         return self
 
     def draw(self, uniform: float) -> float | int:
-        """Turn a number from 0 to 1, without 1, into one of the range."""
+        """Map a number in [0, 1) to the range."""
         if self.whole:
             return int(self.low + np.floor(uniform * (self.high - self.low + 1.0)))
         if self.log:
@@ -54,7 +54,7 @@ class Range(FileModel):
 
 @dataclass(frozen=True)
 class Value:
-    """A value that a setting takes, and where it stands in the file."""
+    """A value of a setting, and its location in the file."""
 
     location: Location
     value: Any
@@ -66,7 +66,7 @@ Varied = dict[str, list[Value]]
 
 @dataclass(frozen=True)
 class CellFile(TomlFile):
-    """The file, as if it said the settings of one cell."""
+    """The file, as if it had the settings of one cell."""
 
     cell_lines: Mapping[Location, int]
 
@@ -77,7 +77,7 @@ class CellFile(TomlFile):
 
 
 def leaves(location: Location, table: Mapping[str, Any]) -> Iterator[tuple[str, Location, Any]]:
-    """Yield dotted name, location and value of what is inside; names may be in quotes or not."""
+    """Yield dotted name, location and value of each setting; names may be in quotes or not."""
     for key, value in table.items():
         here = (*location, key)
         if isinstance(value, dict) and not Range.model_fields.keys() & value.keys():
@@ -108,7 +108,7 @@ def read_random(
     samples: int,
     seed: int,
 ) -> Varied:
-    """Draw values; those of a setting depend on nothing else, so that more samples add to them."""
+    """Draw values; those of a setting depend on nothing else, so more samples only add values."""
     if samples > 1 and not table:
         mistakes.append(file.error(("samples",), "samples: no setting is random"))
     random: Varied = {}
@@ -135,7 +135,7 @@ def read_random(
 
 
 def refuse_twice(file: TomlFile, tables: Sequence[Varied], mistakes: list[FileError]) -> None:
-    """Refuse a setting that stands in two tables."""
+    """Refuse a setting that is in two tables."""
     seen: set[str] = set()
     for name, values in [item for table in tables for item in table.items()]:
         if name in seen:
@@ -146,7 +146,7 @@ def refuse_twice(file: TomlFile, tables: Sequence[Varied], mistakes: list[FileEr
 def combinations(
     samples: int, fixed: Varied, grid: Varied, random: Varied
 ) -> Iterator[tuple[dict[str, Any], dict[str, Location]]]:
-    """Yield the values of each cell and their locations: the grid, its last setting fastest."""
+    """Yield values and locations of each cell; the last setting of the grid changes fastest."""
     for chosen in product(*grid.values()):
         for sample in range(samples):
             cell = {name: values[0] for name, values in fixed.items()}
