@@ -250,7 +250,7 @@ def test_missing_files_are_named(tmp_path, name):
         ("boxes.csv", ",3,1,0", ",3,1", "boxes.csv:2: 11 fields, but 12 columns"),
         ("odometry.txt", "0.25 ", "0.5 ", "odometry.txt: its times are not those of"),
         ("map.json", '"objects"', '"things"', "map.json: has no list of objects"),
-        ("map.json", '"center"', '"center"', "map.json: objects row 0: missing center"),
+        ("map.json", '"center"', '"middle"', "map.json: objects row 0: missing center"),
         ("map.json", '"id": 8', '"id": 3', "map.json: id 3 occurs twice"),
         ("map.json", "      0.4,", "      -0.4,", "map.json: objects row 0: semi_axes and"),
         ("map.json", "      -2.0,", "      null,", "map.json: objects center row 0: not finite"),
