@@ -34,8 +34,9 @@ class PredictedBoxes:
     def without(self, objects: NDArray[np.bool_]) -> PredictedBoxes:
         """Leave out some objects: a flag for each that ``object_row`` may name."""
         kept = ~objects[self.object_row]
-        fields = (self.object_row, self.box, self.covariance, self.out_of_sight)
-        return PredictedBoxes(*(field[kept] for field in fields))
+        return PredictedBoxes(
+            self.object_row[kept], self.box[kept], self.covariance[kept], self.out_of_sight[kept]
+        )
 
 
 def predict_boxes(
@@ -120,7 +121,7 @@ def pair_costs(
     """
     error = box[:, None] - predicted.box
     reaches = error * [-1.0, -1.0, 1.0, 1.0] < 0.0
-    is_cut = truncated.any(axis=1)[:, None, None]
+    is_cut = np.asarray(truncated.any(axis=1))[:, None, None]
     ignored = truncated[:, None, :] | (is_cut & predicted.out_of_sight & reaches)
     error = np.where(ignored, 0.0, error)
     # An edge that is ignored: no error, and a variance that the determinant does not see.
