@@ -50,17 +50,19 @@ class Labels:
         return cls(tracklets.copy(), np.searchsorted(classes, detections.class_id), len(classes))
 
     def make_room(self, *, tracklets: int = 0, objects: int = 0, classes: int = 0) -> None:
-        """Have at least so many tracklets, objects and classes; what was there is not touched."""
-        new = max(tracklets - len(self.object_of_tracklet), 0)
-        self.object_of_tracklet = np.append(self.object_of_tracklet, np.full(new, -1))
+        """Have at least so many tracklets, objects and classes, in new arrays."""
+        new = tracklets - len(self.object_of_tracklet)
+        if new > 0:
+            self.object_of_tracklet = np.append(self.object_of_tracklet, np.full(new, -1))
         rows, columns = self.votes.shape
-        grown = np.zeros((max(objects, rows), max(classes, columns)), dtype=np.int64)
-        grown[:rows, :columns] = self.votes
-        self.votes = grown
-        self.joined_into = np.append(self.joined_into, np.arange(len(self.joined_into), len(grown)))
+        if objects > rows or classes > columns:
+            votes = np.zeros((max(objects, rows), max(classes, columns)), dtype=np.int64)
+            votes[:rows, :columns] = self.votes
+            self.votes = votes
+            self.joined_into = np.append(self.joined_into, np.arange(rows, len(votes)))
 
     def add_boxes(self, tracklets: Ints, box_class: Ints) -> None:
-        """Let more boxes wait; what was there is not touched."""
+        """Let more boxes wait, in new arrays."""
         self.tracklets = np.append(self.tracklets, tracklets)
         self.box_class = np.append(self.box_class, box_class)
         self.object_rows = np.append(self.object_rows, np.full(len(tracklets), -1))

@@ -156,25 +156,22 @@ class SceneMap:
 
         Shapes (o,) and (k + 9 o, k + 9 o), the tangent of the pose first.
         """
-        known = object_rows[np.isin(object_rows, list(self.prior_covariance))]
-        seen, covariance = self._covariance_of_seen(pose, np.setdiff1d(object_rows, known))
-        if not known.size:
-            return seen, covariance
         from scipy.linalg import block_diag
 
-        # How such an object and the path are correlated is not kept.
-        priors = [self.prior_covariance[row] for row in known.tolist()]
-        return np.concatenate([seen, known]), block_diag(covariance, *priors)
-
-    def _covariance_of_seen(self, pose: int, object_rows: Ints) -> tuple[Ints, Floats]:
+        has_prior = np.isin(object_rows, list(self.prior_covariance))
+        seen, known = object_rows[~has_prior], object_rows[has_prior]
         graph = self.graph(end=pose + 1)
         if graph is None:
-            k = self.recording.odometry.covariance.shape[1]
-            return object_rows[:0], np.zeros((k, k))
-        seen = object_rows[np.isin(object_rows, graph.object_ids)]
-        rows = np.searchsorted(graph.object_ids, seen).tolist()
-        state = self.state(graph)
-        return seen, _core.joint_covariance(graph.core, self._options(), state, [pose], rows)
+            seen, covariance = seen[:0], np.zeros(self.recording.odometry.covariance.shape[1:])
+        else:
+            seen = seen[np.isin(seen, graph.object_ids)]
+            rows = np.searchsorted(graph.object_ids, seen).tolist()
+            covariance = _core.joint_covariance(
+                graph.core, self._options(), self.state(graph), [pose], rows
+            )
+        # How an object with a prior and the path are correlated is not kept.
+        priors = [self.prior_covariance[row] for row in known.tolist()]
+        return np.append(seen, known), block_diag(covariance, *priors)
 
     # ---- boxes at given poses
 

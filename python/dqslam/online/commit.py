@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Collection, Sequence
 
 import numpy as np
@@ -61,16 +60,14 @@ def _merged(known: Labels, local: LocalMap, part: slice, rows: Ints, count: int)
     row_of = np.append(rows, -1)
     kept = np.append(np.arange(count), -1)  # itself, or the object that it was joined into
     kept[: len(base.votes)] = row_of[now.joined_into[: len(base.votes)]]
-    merged = copy.copy(known)
+    merged = known.since(0)
     merged.make_room(tracklets=len(now.object_of_tracklet), objects=count)
 
     shown = kept[known.object_rows]
     shown[part] = _changed(shown[part], kept[base.object_rows[part]], row_of[now.object_rows])
     moved = np.flatnonzero(shown != known.object_rows)
-    merged.object_rows = known.object_rows.copy()
     merged.release(moved)
     merged.assign(moved, shown[moved])
-    merged.tracklets = known.tracklets.copy()
     merged.tracklets[part] = _changed(known.tracklets[part], base.tracklets[part], now.tracklets)
     own, begun = kept[merged.object_of_tracklet], len(base.object_of_tracklet)
     found = row_of[now.object_of_tracklet]

@@ -20,22 +20,19 @@ from dqslam.recording import as_poses, tangent_size
 Int32s = NDArray[np.int32]
 
 
-class PathBegin:
-    """The first pose, and how well it is known."""
+def path_begin(
+    pose_model: _core.PoseModel, pose: ArrayLike | None, covariance: ArrayLike | None
+) -> tuple[Floats, Floats]:
+    """Return the first pose, (d,), and its covariance, (k, k), empty where it is exact.
 
-    def __init__(
-        self, pose_model: _core.PoseModel, pose: ArrayLike | None, covariance: ArrayLike | None
-    ) -> None:
-        """Check; by default it is the origin, known exactly."""
-        given = identity_pose(pose_model) if pose is None else pose
-        self.pose = as_poses("first_pose", np.atleast_2d(given), pose_model)[0]
-        """world_from_robot, shape (d,)."""
-        self.covariance = np.zeros((0, 0))
-        """Shape (k, k), empty where it is exact."""
-        if covariance is not None:
-            one = np.asarray(covariance, dtype=np.float64)[None]
-            k = tangent_size(pose_model)
-            self.covariance = as_covariances("first_covariance", one, 1, k)[0]
+    By default it is the origin, known exactly.
+    """
+    given = identity_pose(pose_model) if pose is None else pose
+    first = as_poses("first_pose", np.atleast_2d(given), pose_model)[0]
+    if covariance is None:
+        return first, np.zeros((0, 0))
+    one = np.asarray(covariance, dtype=np.float64)[None]
+    return first, as_covariances("first_covariance", one, 1, tangent_size(pose_model))[0]
 
 
 def next_time(last: float | None, timestamp: float | None) -> float:
@@ -52,7 +49,7 @@ def next_time(last: float | None, timestamp: float | None) -> float:
 
 
 def motion_arrays(
-    odometry: Motion | None, begin: PathBegin | None, covariance: Floats | None
+    odometry: Motion | None, begin: tuple[Floats, Floats] | None, covariance: Floats | None
 ) -> tuple[Floats, Floats]:
     """Return a motion and its covariance; of the first step, where it begins.
 
@@ -61,7 +58,7 @@ def motion_arrays(
     if begin is not None:
         if odometry is not None:
             raise ValueError("the first step has no odometry: it is where the path begins")
-        return begin.pose, begin.covariance
+        return begin
     if odometry is None:
         raise ValueError(
             "no odometry leads here; across a gap, give a guess and a covariance as wide"

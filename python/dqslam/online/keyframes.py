@@ -55,13 +55,14 @@ class KeyframeStore:
         self.map_covariance: dict[ObjectRow, Floats] = {}
         """Of objects that were known before the session, (9, 9)."""
         self._class_ids: dict[str, int] = {}
-        self._images: dict[int, tuple[Ints, Ints]] = {}  # of a step: boxes and their tracklets
+        self.images: dict[int, tuple[Ints, Ints]] = {}
+        """Of a step: its boxes that are identified, and their tracklets."""
 
     # ---- images
 
     def add_image(self, step: int, rows: Ints, tracklets: Ints, *, free_tracklet: int) -> None:
         """Remember the tracklets of some boxes of a step; numbers from the free one on are new."""
-        self._images[step] = (rows, tracklets)
+        self.images[step] = (rows, tracklets)
         self.labels.make_room(tracklets=free_tracklet)
 
     def add_keyframe(self, keyframe: Keyframe, observation_rows: Ints, tracklets: Ints) -> None:
@@ -83,18 +84,6 @@ class KeyframeStore:
     def class_names(self) -> dict[int, str]:
         """What the columns stand for."""
         return {number: name for name, number in self._class_ids.items()}
-
-    def shown(self) -> dict[int, tuple[Ints, Ints]]:
-        """Return the boxes of each step that were identified and their objects, -1 for none."""
-        labels = self.labels
-        shown = {
-            step: (rows, labels.object_of_tracklet[tracklets])
-            for step, (rows, tracklets) in self._images.items()
-        }
-        ends = np.cumsum([len(frame.boxes.box) for frame in self.keyframes])
-        for frame, own in zip(self.keyframes, np.split(labels.object_rows, ends)[:-1], strict=True):
-            shown[frame.pose] = (shown[frame.pose][0], own)
-        return shown
 
     # ---- objects
 

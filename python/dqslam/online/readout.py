@@ -25,10 +25,15 @@ def read_objects(state: State) -> Objects:
 def read_assignments(state: State) -> list[Ints]:
     """Return the ids that the boxes of each step show, as far as is known now; -1 for none."""
     ids = np.array([*state.registry.ids, -1], dtype=np.int64)
+    store, labels = state.store, state.store.labels
     assignments = list(state.given_ids)
-    for step, (boxes, rows) in state.store.shown().items():
+    for step, (boxes, tracklets) in store.images.items():
         assignments[step] = assignments[step].copy()
-        assignments[step][boxes] = ids[rows]
+        assignments[step][boxes] = ids[labels.object_of_tracklet[tracklets]]
+    ends = np.searchsorted(store.box_keyframe, np.arange(1, len(store.keyframes)))
+    for keyframe, rows in zip(store.keyframes, np.split(labels.object_rows, ends), strict=False):
+        boxes, _ = store.images[keyframe.pose]
+        assignments[keyframe.pose][boxes] = ids[rows]
     return assignments
 
 

@@ -17,7 +17,7 @@ from dqslam.association import FINAL, UNSURE
 from dqslam.assumptions import BoxNoise, OdometryNoise, SizePrior, SizePriors
 from dqslam.estimate import Estimate
 from dqslam.online.identify import Identifier
-from dqslam.online.inputs import PathBegin
+from dqslam.online.inputs import path_begin
 from dqslam.online.keyframes import KeyframeStore
 from dqslam.online.maps import add_map, load_map, save_map
 from dqslam.online.objects import Objects, Registry
@@ -123,7 +123,7 @@ class OnlineSlam:
         )
         self._state = State(
             settings,
-            PathBegin(pose_model, first_pose, first_covariance),
+            path_begin(pose_model, first_pose, first_covariance),
             _core.Session(pose_model, camera, scene, online),
             Registry(),
             KeyframeStore(size_prior),
@@ -210,7 +210,7 @@ class OnlineSlam:
     def pose(self) -> Floats:
         """world_from_robot now, shape (d,); the first pose before any step."""
         if not len(self):
-            return np.asarray(self._state.begin.pose)
+            return self._state.begin[0]
         return np.asarray(self._state.core.pose_at(len(self) - 1))
 
     @property
@@ -330,8 +330,8 @@ class OnlineSlam:
         if first_boxes is not None:
             if settings.get("first_pose") is None:
                 found = slam.relocalize(first_boxes)
-                begin = PathBegin(slam.pose_model, found.pose, found.covariance)
-                slam._state.begin, first_boxes = begin, found.with_ids(first_boxes)
+                slam._state.begin = path_begin(slam.pose_model, found.pose, found.covariance)
+                first_boxes = found.with_ids(first_boxes)
             slam.add(None, first_boxes)
         return slam
 

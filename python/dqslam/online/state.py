@@ -8,10 +8,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from dqslam import _core
-from dqslam._checks import Ints
+from dqslam._checks import Floats, Ints
 from dqslam._ids import ObjectRow
 from dqslam.assumptions import BoxNoise, OdometryNoise, SizePrior, SizePriors
-from dqslam.online.inputs import PathBegin
 from dqslam.online.keyframes import KeyframeStore
 from dqslam.online.objects import Registry
 
@@ -39,7 +38,8 @@ class State:
     """What a session knows."""
 
     settings: Settings
-    begin: PathBegin
+    begin: tuple[Floats, Floats]
+    """First pose and its covariance, as ``path_begin`` has them."""
     core: _core.Session
     """All poses and boxes, and the estimate."""
     registry: Registry
