@@ -122,7 +122,7 @@ TYPED_TEST(Rows, JacobiansOfBoxesAreWhatPerturbationsShow) {
     };
     const RowMatrix expected = (moved(kStep) - moved(-kStep)) / (2 * kStep);
     const RowMatrix found =
-        jacobians.col(column).reshaped<Eigen::RowMajor>(of.size(), Eigen::fix<kBoxSize>);
+        jacobians.col(column).template reshaped<Eigen::RowMajor>(of.size(), Eigen::fix<kBoxSize>);
     EXPECT_LT((found - expected).cwiseAbs().maxCoeff(), 1e-3) << "column " << column;
   }
 }

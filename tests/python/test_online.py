@@ -88,6 +88,28 @@ def test_a_polish_finds_what_solve_finds(problem):
     np.testing.assert_allclose(found.initial_poses, estimate.initial_poses, atol=1e-9)
 
 
+def test_ranges_reach_a_session_as_they_reach_solve(problem):
+    boxes, truth = problem.recording.detections, problem.truth
+    name = int(boxes.object_id[0])
+    poses = boxes.pose[boxes.object_id == name][[10, 20, 30]]
+    center = truth.center[np.flatnonzero(truth.object_id == name)[0]]
+    robots = np.column_stack([truth.poses[poses, :2], np.zeros(3)])
+    ranges = dq.Measurements(
+        "range",
+        poses,
+        np.full(3, name),
+        np.linalg.norm(center - robots, axis=1)[:, None] + 0.1,  # too long, by five sigmas
+        np.full((3, 1, 1), 0.02**2),
+    )
+    recording = replace(problem.recording, positions=None, measurements=(ranges,))
+    _, summary = solve(build_graph(recording, box_noise=NOISE))
+    _, without = solve(build_graph(replace(recording, measurements=()), box_noise=NOISE))
+    assert summary.final_cost > without.final_cost + 1.0
+    slam = OnlineSlam(recording.camera, box_noise=NOISE)
+    assert len(list(replay(slam, recording))) == len(recording.timestamps)
+    assert slam.polish().result().cost == pytest.approx(summary.final_cost, rel=1e-6)
+
+
 def test_before_a_polish_it_is_nearly_as_good():
     before, after = [], []
     for seed in range(3):
