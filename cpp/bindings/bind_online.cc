@@ -4,6 +4,7 @@
 #include "bindings.h"
 #include "dqslam/online/relocalize.h"
 #include "dqslam/online/session.h"
+#include "keywords.h"
 
 namespace py = pybind11;
 using namespace pybind11::literals;
@@ -21,6 +22,7 @@ using online::StepReport;
 void BindOptions(py::module_& m) {
   py::class_<SmoothingLevel>(m, "SmoothingLevel", "A level of smoothing beside the window's.")
       .def(py::init<int, int, int>(), "poses"_a, "every"_a, "iterations"_a)
+      .def("__repr__", &ShowChanges<SmoothingLevel>)
       .def_readwrite(
           "poses", &SmoothingLevel::poses, "How many of the last poses are minimized together.")
       .def_readwrite("every",
@@ -30,12 +32,8 @@ void BindOptions(py::module_& m) {
                      &SmoothingLevel::iterations,
                      "How many Levenberg-Marquardt steps a smoothing takes.");
   py::class_<OnlineOptions>(m, "OnlineOptions", "What a caller of a session may choose.")
-      .def(py::init([](const py::kwargs& values) {
-             py::object options = py::cast(OnlineOptions());
-             for (const auto& [name, value] : values) py::setattr(options, name, value);
-             return options.cast<OnlineOptions>();
-           }),
-           "Any of the attributes as keywords.")
+      .def(py::init(&FromKeywords<OnlineOptions>), "Any of the attributes as keywords.")
+      .def("__repr__", &ShowChanges<OnlineOptions>)
       .def_readwrite("window_poses",
                      &OnlineOptions::window_poses,
                      "How many of the last poses are minimized at every step.")
@@ -75,6 +73,7 @@ void BindOptions(py::module_& m) {
 
 void BindReport(py::module_& m) {
   py::class_<StepReport>(m, "StepReport", "What a step cost.")
+      .def("__repr__", &ShowChanges<StepReport>)
       .def_readonly("pose", &StepReport::pose, "Row of the new pose.")
       .def_readonly("first_observation",
                     &StepReport::first_observation,

@@ -32,29 +32,41 @@ __all__: list[str] = [
     "Schedule",
     "Session",
     "SizePriorTable",
+    "SmoothingLevel",
     "Solution",
     "SolveOptions",
     "Start",
     "State",
+    "StepObservations",
     "StepReport",
     "Summary",
     "UnderConstrained",
     "VariableKind",
+    "adjoint",
     "axes_from_ellipsoid",
     "between",
+    "box_chi_squares",
     "compose",
     "covariance",
     "dead_reckon",
+    "differentiate_boxes",
     "dual_quadric_from_ellipsoid",
     "dual_quadric_matrix",
+    "dual_quadric_shapes",
+    "edges_out_of_sight",
     "ellipsoid_from_axes",
     "ellipsoid_from_dual_quadric",
+    "ellipsoid_shapes",
     "fit",
+    "inverse",
     "joint_covariance",
+    "log_semi_axes_jacobian",
     "minus",
     "plus",
     "project_to_boxes",
+    "project_to_outlines",
     "relocalize",
+    "shape_from_axes_jacobian",
     "solve",
     "world_from_camera",
 ]
@@ -87,6 +99,12 @@ class Camera:
         Focal lengths, principal point and size in pixels; k1 k2 p1 p2 k3; the SE(3) mount.
         """
     def __repr__(self) -> str: ...
+    def distort_boxes(
+        self, undistorted: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"]
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Boxes as recorded, shape (n, 4): inverts undistort_boxes, to a small part of a pixel.
+        """
     def distort_points(
         self, undistorted: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"]
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
@@ -833,6 +851,39 @@ class Relocation:
         Chi-square of the best other place with as many matches; infinite: none.
         """
 
+class SmoothingLevel:
+    """
+    A level of smoothing beside the window's.
+    """
+    def __init__(
+        self,
+        poses: typing.SupportsInt | typing.SupportsIndex,
+        every: typing.SupportsInt | typing.SupportsIndex,
+        iterations: typing.SupportsInt | typing.SupportsIndex,
+    ) -> None: ...
+    def __repr__(self) -> str: ...
+    @property
+    def every(self) -> int:
+        """
+        How many steps lie between two smoothings of this level.
+        """
+    @every.setter
+    def every(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    @property
+    def iterations(self) -> int:
+        """
+        How many Levenberg-Marquardt steps a smoothing takes.
+        """
+    @iterations.setter
+    def iterations(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    @property
+    def poses(self) -> int:
+        """
+        How many of the last poses are minimized together.
+        """
+    @poses.setter
+    def poses(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+
 class OnlineOptions:
     """
     What a caller of a session may choose.
@@ -843,107 +894,79 @@ class OnlineOptions:
         """
     def __repr__(self) -> str: ...
     @property
-    def lap_every(self) -> int:
+    def long_smoothing(self) -> SmoothingLevel:
         """
-        each so many steps.
+        The level that takes the place of a medium one when it is due.
         """
-    @lap_every.setter
-    def lap_every(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    @property
-    def lap_poses(self) -> int:
-        """
-        Minimized rarely,
-        """
-    @lap_poses.setter
-    def lap_poses(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    @long_smoothing.setter
+    def long_smoothing(self, arg0: SmoothingLevel) -> None: ...
     @property
     def loop_absence(self) -> int:
         """
-        Poses without a observation before an object closes a loop.
+        An object closes a loop when it is seen again after more poses than this.
         """
     @loop_absence.setter
     def loop_absence(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
     @property
     def loop_chi_square(self) -> float:
         """
-        Of the window, per residual: the loop does not fit.
+        A loop does not fit when the window's chi-square per residual is above this.
         """
     @loop_chi_square.setter
     def loop_chi_square(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
     @property
     def loop_iterations(self) -> int:
         """
-        Levenberg-Marquardt steps over a loop.
+        How many Levenberg-Marquardt steps a loop that does not fit takes.
         """
     @loop_iterations.setter
     def loop_iterations(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
     @property
     def loss_scale(self) -> float:
         """
-        Of a Cauchy loss on boxes, sigmas of a box; 0: least squares.
+        The scale of a Cauchy loss on whole boxes, in sigmas; 0 stands for least squares.
         """
     @loss_scale.setter
     def loss_scale(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
     @property
+    def medium_smoothing(self) -> SmoothingLevel:
+        """
+        The level that is due more often while a session is young.
+        """
+    @medium_smoothing.setter
+    def medium_smoothing(self, arg0: SmoothingLevel) -> None: ...
+    @property
     def misfit_chi_square(self) -> float:
         """
-        Of the window, per residual: its objects start again.
+        The last poses and their objects start again when the window's chi-square per residual is above this.
         """
     @misfit_chi_square.setter
     def misfit_chi_square(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
     @property
-    def recent_every(self) -> int:
-        """
-        each so many steps.
-        """
-    @recent_every.setter
-    def recent_every(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    @property
-    def recent_poses(self) -> int:
-        """
-        Minimized now and then,
-        """
-    @recent_poses.setter
-    def recent_poses(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    @property
     def recover_every(self) -> int:
         """
-        Steps between two such starts, at least.
+        How many steps lie at least between two such starts.
         """
     @recover_every.setter
     def recover_every(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
     @property
-    def smoothing_iterations(self) -> int:
+    def short_smoothing(self) -> SmoothingLevel:
         """
-        Levenberg-Marquardt steps of these two.
+        The level that repairs what the window froze too early.
         """
-    @smoothing_iterations.setter
-    def smoothing_iterations(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    @property
-    def tour_every(self) -> int:
-        """
-        each so many steps.
-        """
-    @tour_every.setter
-    def tour_every(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    @property
-    def tour_poses(self) -> int:
-        """
-        Minimized by one such step,
-        """
-    @tour_poses.setter
-    def tour_poses(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    @short_smoothing.setter
+    def short_smoothing(self, arg0: SmoothingLevel) -> None: ...
     @property
     def window_iterations(self) -> int:
         """
-        Levenberg-Marquardt steps of the window.
+        How many Levenberg-Marquardt steps the window takes at every step.
         """
     @window_iterations.setter
     def window_iterations(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
     @property
     def window_poses(self) -> int:
         """
-        Minimized at every step.
+        How many of the last poses are minimized at every step.
         """
     @window_poses.setter
     def window_poses(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
@@ -959,11 +982,14 @@ class StepReport:
         Of the window, per residual: 1 where the model is right.
         """
     @property
-    def closed_loop(self) -> bool: ...
+    def closed_loop(self) -> bool:
+        """
+        A loop that did not fit was solved.
+        """
     @property
     def first_observation(self) -> int:
         """
-        Row of the first it saw: boxes as they were given, then positions.
+        Row of its first observation: boxes as they were given, then positions.
         """
     @property
     def linearized(self) -> int:
@@ -978,7 +1004,7 @@ class StepReport:
     @property
     def recovered(self) -> bool:
         """
-        Young objects were started again.
+        The last poses and their young objects were started again.
         """
     @property
     def smoothed_observations(self) -> int:
@@ -1006,6 +1032,25 @@ class StepReport:
         Poses of the window.
         """
 
+class StepObservations:
+    """
+    What one pose saw.
+    """
+    def __init__(
+        self,
+        *,
+        object: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
+        box: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+        covariance: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+        truncated: typing.Annotated[numpy.typing.ArrayLike, numpy.bool, "[m, n]"],
+        measurements: collections.abc.Sequence[MeasurementTable] = [],
+        log_size_mean: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] = ...,
+        log_size_sigma: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] = ...,
+    ) -> None:
+        """
+        Boxes (n, 4) in undistorted pixels with covariances (n, 16), edges cut by the image border (n, 4) and the row of the object of each (n,); measurements, one table a kind, whose poses are not used; size priors of the new objects. Rows from num_objects on are new objects, in order. A box of object -1 waits and takes no part.
+        """
+
 class Session:
     """
     Estimation step by step.
@@ -1021,18 +1066,10 @@ class Session:
         self,
         relative: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
         covariance: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
-        object: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
-        box: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
-        box_covariance: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
-        truncated: typing.Annotated[numpy.typing.ArrayLike, numpy.bool, "[m, n]"],
-        position_object: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
-        position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
-        position_covariance: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
-        log_size_mean: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-        log_size_sigma: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        observations: StepObservations,
     ) -> StepReport:
         """
-        Add a pose and what it saw: covariance (k, k), boxes (n, 4) with covariances (n, 16), positions (p, 3) with covariances (p, 9), size priors of the new objects. A box of object -1 waits and takes no part. The first pose's relative is the pose itself, exact if its covariance is empty.
+        Add a pose and what it saw; covariance (k, k). The first pose's relative is the pose itself, which is exact if its covariance is empty.
         """
     def add_map_object(
         self,
@@ -1119,6 +1156,13 @@ class Session:
         Shape (n, d).
         """
 
+def adjoint(
+    model: PoseModel, a_from_b: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"]
+) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Matrices (n, k, k) that turn a small motion in the frame of b into the same motion in the frame of a.
+    """
+
 def axes_from_ellipsoid(
     ellipsoid: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[9, 1]"],
 ) -> tuple[
@@ -1137,6 +1181,19 @@ def between(
 ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
     """
     Relative poses row by row: b_from_c, shape (n, d).
+    """
+
+def box_chi_squares(
+    model: PoseModel,
+    camera: Camera,
+    poses: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    ellipsoids: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    boxes: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    covariances: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    truncated: typing.Annotated[numpy.typing.ArrayLike, numpy.bool, "[m, n]"],
+) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+    """
+    Chi-squares (n,), 4 degrees of freedom, of boxes (n, 4) with covariances (n, 16) [px^2] and edges that the image border cut (n, 4), for ellipsoid i from pose i. An edge that only bounds the object counts where the prediction ends inside. Infinite unless the object is strictly in front.
     """
 
 def compose(
@@ -1162,6 +1219,20 @@ def dead_reckon(
     Chain relative poses (n, d) behind the first (d,): shape (n + 1, d).
     """
 
+def differentiate_boxes(
+    model: PoseModel,
+    camera: Camera,
+    poses: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    ellipsoids: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+) -> tuple[
+    typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"],
+    typing.Annotated[numpy.typing.NDArray[numpy.bool], "[m, 1]"],
+    numpy.typing.NDArray[numpy.float64],
+]:
+    """
+    What project_to_boxes returns, and Jacobians (n, 4, k + 9) of the boxes by the tangent of the pose, then by the ellipsoid; NaN where it is not strictly in front.
+    """
+
 def dual_quadric_from_ellipsoid(
     ellipsoid: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[9, 1]"],
 ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[9, 1]"]:
@@ -1174,6 +1245,23 @@ def dual_quadric_matrix(
 ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
     """
     The 4 x 4 matrix Q* of q1 .. q9, with Q*(4,4) = 1.
+    """
+
+def dual_quadric_shapes(
+    quadrics: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Shapes S = c c^T - Q*_33 [m^2], (n, 3, 3), of any signature, of q1 .. q9 (n, 9).
+    """
+
+def edges_out_of_sight(
+    model: PoseModel,
+    camera: Camera,
+    poses: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    ellipsoids: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+) -> typing.Annotated[numpy.typing.NDArray[numpy.bool], "[m, n]"]:
+    """
+    Edges (n, 4) of the same boxes that the outline touches outside the image, where no detector sees it.
     """
 
 def ellipsoid_from_axes(
@@ -1192,9 +1280,23 @@ def ellipsoid_from_dual_quadric(
     Log-Cholesky parameters (9,) of q1 .. q9; ValueError when q is no ellipsoid.
     """
 
+def ellipsoid_shapes(
+    ellipsoids: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Shapes S [m^2], (n, 3, 3), of log-Cholesky parameters (n, 9).
+    """
+
 def fit(graph: Graph, options: SolveOptions, state: State) -> Fit:
     """
     Residuals and leverage of odometry and boxes, from which variance components are estimated.
+    """
+
+def inverse(
+    model: PoseModel, a_from_b: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"]
+) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+    """
+    Invert poses row by row: b_from_a, shape (n, d).
     """
 
 def joint_covariance(
@@ -1206,6 +1308,13 @@ def joint_covariance(
 ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
     """
     Joint covariance of some poses and objects: k rows for each pose, then 9 rows for each object.
+    """
+
+def log_semi_axes_jacobian(
+    ellipsoid: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[9, 1]"],
+) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 9]"]:
+    """
+    Logarithms of the semi-axes, descending, by the parameters of an ellipsoid: (3, 9).
     """
 
 def minus(
@@ -1239,6 +1348,18 @@ def project_to_boxes(
     Boxes (n, 4) of ellipsoid i from pose i [undistorted px], and whether it is strictly in front (n,); NaN where it is not.
     """
 
+def project_to_outlines(
+    model: PoseModel,
+    camera: Camera,
+    poses: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    ellipsoids: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    *,
+    points: typing.SupportsInt | typing.SupportsIndex = 128,
+) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Outlines (n, points, 2) of ellipsoid i from pose i [undistorted px], the last point the first again; NaN where it is not strictly in front.
+    """
+
 def relocalize(
     pose_model: PoseModel,
     camera: Camera,
@@ -1254,6 +1375,14 @@ def relocalize(
 ) -> Relocation:
     """
     Find the pose from boxes (b, 4) of objects (o, 9), with covariances (o, 81) and (b, 16); the candidates of a box are rows of objects that it may show. ValueError where there is none.
+    """
+
+def shape_from_axes_jacobian(
+    semi_axes: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
+    orientation_xyzw: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 1]"],
+) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 6]"]:
+    """
+    Log-Cholesky shape by the logarithms of the semi-axes and a turn about each [rad]: (6, 6).
     """
 
 def solve(graph: Graph, options: SolveOptions = ..., start: State | None = None) -> Solution:

@@ -9,7 +9,6 @@ namespace {
 
 // Rosenbrock's valley as two residuals, 10 (y - x^2) and 1 - x: zero at (1, 1).
 struct Valley {
-  static constexpr int kSize = 2;
   double most_x = 10;  // states beyond are impossible
   int linearizations = 0;
 
@@ -31,10 +30,23 @@ struct Valley {
   double CostAt(const Eigen::Vector2d& at) const { return 0.5 * Residual(at).squaredNorm(); }
 };
 
+double Minimize(int iterations, double tolerance, Valley* valley, Eigen::Vector2d* at) {
+  using Eigen::Matrix2d, Eigen::Vector2d;
+  return LevenbergMarquardt<2>(
+      iterations,
+      tolerance,
+      at,
+      [=](const Vector2d& at, Matrix2d* H, Vector2d* g) { return valley->Linearize(at, H, g); },
+      [=](const Vector2d& at, const Vector2d& step, Vector2d* to) {
+        return valley->Retract(at, step, to);
+      },
+      [=](const Vector2d& at) { return valley->CostAt(at); });
+}
+
 TEST(LevenbergMarquardt, FollowsABentValley) {
   Valley valley;
   Eigen::Vector2d at(-1.2, 1);
-  const double cost = LevenbergMarquardt(100, 1e-12, &valley, &at);
+  const double cost = Minimize(100, 1e-12, &valley, &at);
   EXPECT_LT((at - Eigen::Vector2d(1, 1)).norm(), 1e-9);
   EXPECT_EQ(cost, valley.CostAt(at));
 }
@@ -42,7 +54,7 @@ TEST(LevenbergMarquardt, FollowsABentValley) {
 TEST(LevenbergMarquardt, StopsAfterAStepThatGainsLittle) {
   Valley valley;
   Eigen::Vector2d at(-1.2, 1);
-  const double before = valley.CostAt(at), after = LevenbergMarquardt(100, 1.0, &valley, &at);
+  const double before = valley.CostAt(at), after = Minimize(100, 1.0, &valley, &at);
   EXPECT_EQ(valley.linearizations, 1);
   EXPECT_LT(after, before);
 }
@@ -51,7 +63,7 @@ TEST(LevenbergMarquardt, NeverTakesAStepThatCostsMoreOrIsImpossible) {
   Valley valley;
   valley.most_x = -1.2;
   Eigen::Vector2d at(-1.2, 1.44);  // on the valley's floor: every step that gains leads ahead
-  EXPECT_EQ(LevenbergMarquardt(30, 1e-12, &valley, &at), 0.5 * 2.2 * 2.2);
+  EXPECT_EQ(Minimize(30, 1e-12, &valley, &at), 0.5 * 2.2 * 2.2);
   EXPECT_EQ(at, Eigen::Vector2d(-1.2, 1.44));
   EXPECT_EQ(valley.linearizations, 1) << "it has not moved";
 }

@@ -289,14 +289,16 @@ TYPED_TEST(SessionTest, PositionsKeepTheirObject) {
   this->Add(session.get(), 0, kNone, kAll);
   StepObservations observations;
   observations.box.resize(0, 4);
-  observations.position_object = IndexVector::Zero(1);
-  observations.position = RowMatrix::Constant(1, 3, 1);
-  observations.position_covariance = Eigen::Matrix3d::Identity().reshaped().transpose();
+  observations.measurements = {{"position",
+                                IndexVector(),
+                                IndexVector::Zero(1),
+                                RowMatrix::Constant(1, 3, 1),
+                                Eigen::Matrix3d::Identity().reshaped().transpose()}};
   constexpr int k = TypeParam::kTangentSize;
   const Eigen::VectorXd step = this->scene_.graph.odometry.relative.row(0);
   const int row = session->Add(step, RowMatrix::Identity(k, k), observations).first_observation;
   EXPECT_THROW(session->Relabel(this->Labels({row}, -1)), std::invalid_argument);
-  observations.position_object[0] = -1;
+  observations.measurements[0].object[0] = -1;
   EXPECT_THROW(session->Add(step, RowMatrix::Identity(k, k), observations), std::invalid_argument);
   EXPECT_EQ(session->num_poses(), 2);
 }

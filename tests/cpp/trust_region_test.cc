@@ -18,9 +18,9 @@ class Rosenbrock : public LeastSquares {
   Rosenbrock() : LeastSquares(BlockMatrix({1, 1}, {{0, 1}})) {}
   Eigen::VectorXd Pack(const State&) const override { return {}; }
   void Unpack(const Eigen::VectorXd&, State*) const override {}
-  bool Plus(const Eigen::VectorXd& values,
-            const Eigen::VectorXd& step,
-            Eigen::VectorXd* moved) const override {
+  bool Retract(const Eigen::VectorXd& values,
+               const Eigen::VectorXd& step,
+               Eigen::VectorXd* moved) const override {
     *moved = values + step;
     return true;
   }
