@@ -258,7 +258,7 @@ TYPED_TEST(SessionTest, WrongLabelsChangeNothing) {
   wrong[4].first.object[0] = -2, wrong[4].second = "object row 0: unknown id -2";
   wrong[5].first.object.setConstant(-1);
   wrong[5].second = "ellipsoid row 0: no box shows this object";
-  wrong[6].first.ellipsoid(0, 4) = nan, wrong[6].second = "ellipsoid row 0: not a finite ellipsoid";
+  wrong[6].first.ellipsoid(0, 4) = nan, wrong[6].second = "ellipsoid row 0: NaN or infinite";
   wrong[7].first.ellipsoid(0, 3) = 800, wrong[7].second = "ellipsoid row 0: not a finite ellipsoid";
   wrong[8].first.log_size_sigma[0] = 0, wrong[8].second = "log_size_sigma row 0";
   wrong[9].first.ellipsoid.resize(2, 9),

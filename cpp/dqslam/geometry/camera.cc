@@ -112,8 +112,15 @@ RowMatrix Camera::UndistortBoxes(const RowMatrix& distorted) const {
 RowMatrix Camera::DistortBoxes(const RowMatrix& undistorted) const {
   if (!HasDistortion()) return undistorted;
   RowMatrix boxes = FromMiddles(DistortPoints(MiddlesOfEdges(undistorted)));
-  // An edge is undistorted at the middle of the recorded box, which is not that of the other.
-  for (int iteration = 0; iteration < 5; ++iteration) boxes += undistorted - UndistortBoxes(boxes);
+  // An edge is undistorted at the middle of the recorded box, which is not that of the other: a
+  // fixed point, which a few steps reach unless the lens is extreme.
+  constexpr int kMaxIterations = 50;
+  constexpr double kAccuracy = 1e-6;  // pixels
+  for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
+    const RowMatrix error = undistorted - UndistortBoxes(boxes);
+    boxes += error;
+    if (error.size() == 0 || error.cwiseAbs().maxCoeff() < kAccuracy) break;
+  }
   return boxes;
 }
 
