@@ -105,17 +105,18 @@ def check_boxes(boxes: StepBoxes | None) -> CheckedBoxes:
     names = boxes.class_name or ("object",) * count
     if len(names) != count:
         raise ValueError(f"class_name: expected {count} names, got {len(names)}")
-    truncated = np.zeros((count, 4)) if boxes.truncated is None else np.asarray(boxes.truncated)
+    given = np.zeros((count, 4)) if boxes.truncated is None else boxes.truncated
+    truncated = np.asarray(given, dtype=np.bool_)
     if truncated.shape != (count, 4):
         raise ValueError(f"truncated: expected shape ({count}, 4), got {truncated.shape}")
-    return CheckedBoxes(box, object_id.astype(np.int64), names, truncated.astype(np.bool_))
+    return CheckedBoxes(box, object_id.astype(np.int64), names, truncated)
 
 
 def box_noise_rows(noise: BoxNoise, box: Floats) -> Floats:
     """Return the covariances of boxes (b, 4), shape (b, 16)."""
     rows = np.zeros((len(box), 16))
-    side = (box[:, 2:] - box[:, :2])[:, [0, 1, 0, 1]]
-    rows[:, ::5] = noise.pixels**2 + (noise.relative * side) ** 2
+    variance = noise.pixels**2 + (noise.relative * (box[:, 2:] - box[:, :2])) ** 2
+    rows[:, 0::10], rows[:, 5::10] = variance[:, :1], variance[:, 1:]  # of u and of v, twice
     return rows
 
 
