@@ -1,4 +1,4 @@
-"""Object SLAM with dual quadrics: a Ceres core, driven from Python.
+"""Object SLAM with dual quadrics: a C++ core with Ceres costs, driven from Python.
 
 Each name is imported when it is first asked for: a command's help waits for none of them.
 """
@@ -35,6 +35,7 @@ if TYPE_CHECKING:  # the one list of public names, a line each: lazy_exports rea
     from dqslam._core import State as State
     from dqslam._core import StepReport as StepReport
     from dqslam._core import Summary as Summary
+    from dqslam._core import VariableKind as VariableKind
     from dqslam.association import Association as Association
     from dqslam.association import associate as associate
     from dqslam.assumptions import BoxNoise as BoxNoise

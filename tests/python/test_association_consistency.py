@@ -182,7 +182,7 @@ def test_an_id_of_two_objects_is_scattered():
         (made.thing == 5) | ((made.thing == 4) & (np.arange(len(labels)) % 5 == 0)), -1, labels
     )
     scene.labels.assign(np.arange(len(labels)), known)
-    scene.labels.object_of_tracklet = {int(number): int(number) for number in range(5)}
+    scene.labels.object_of_tracklet = np.append(np.arange(5), np.full(len(labels), -1))
     share = np.sum(known == 4) / 80
     expected = f"one place explains {share:.0%} of its boxes: it moved, or its id names several"
     assert find_scattered(scene) == {4: expected}

@@ -46,9 +46,9 @@ def test_the_boxes_of_the_graph_are_those_that_were_given_an_object(made, found)
     boxes = made.recording.detections
     in_keyframes = np.isin(boxes.pose, found.keyframes)
     shown = found.object_id[in_keyframes]
-    np.testing.assert_array_equal(graph.core.boxes, boxes.box[in_keyframes][shown >= 0])
-    np.testing.assert_array_equal(graph.object_ids[graph.core.box_object], shown[shown >= 0])
-    np.testing.assert_allclose(graph.core.box_covariance, _covariances(graph.core.boxes))
+    np.testing.assert_array_equal(graph.core.boxes.box, boxes.box[in_keyframes][shown >= 0])
+    np.testing.assert_array_equal(graph.object_ids[graph.core.boxes.object], shown[shown >= 0])
+    np.testing.assert_allclose(graph.core.boxes.covariance, _covariances(graph.core.boxes.box))
 
 
 def _covariances(boxes):
@@ -59,9 +59,9 @@ def _covariances(boxes):
 def test_what_was_left_out_is_not_in_the_graph(found):
     gone = int(np.flatnonzero(found.ids == 3)[0])
     scene = found.scene
-    before, scene.left_out = scene.left_out, {gone: "it moves"}
+    before, scene.labels.left_out = scene.labels.left_out, {gone: "it moves"}
     graph = found.build_graph()
-    scene.left_out = before
+    scene.labels.left_out = before
     assert graph.object_ids.tolist() == [0, 1, 2, 4, 5, 6, 7]
     start = found.start(graph)
     rows = [int(np.flatnonzero(found.ids == number)[0]) for number in graph.object_ids]

