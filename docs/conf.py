@@ -44,9 +44,9 @@ nitpick_ignore_regex = [
         r"(numpy|np|pathlib|collections|concurrent|typing|pydantic|typer|enum|matplotlib)\..*",
     ),
     ("py:.*", r"(Any|ArrayLike|NDArray|ndarray|float64|int64|bool|Align|Ids|TypeAliasForwardRef)"),
-    ("py:.*", r"dict\[.*|dqslam\.experiment\.methods\.Settings|dqslam\.io\.results\.save\..*"),
-    ("py:.*", r"dqslam\.(view\.scene|sweep|plot)\..*"),
-    ("py:.*", r"dqslam\.associate\.scene_map\.SceneMap"),  # the inside of an association
+    ("py:.*", r"dict\[.*|dqslam\.studies\.paper\.methods\.Settings|dqslam\.io\.results\.save\..*"),
+    ("py:.*", r"dqslam\.(view\.scene|studies\.sweep|plot)\..*"),
+    ("py:.*", r"dqslam\.association\.scene_map\.SceneMap"),  # the inside of an association
 ]
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"

@@ -82,6 +82,7 @@ if TYPE_CHECKING:  # the one list of public names, a line each: lazy_exports rea
     from dqslam.studies.paper import run_paper as run_paper
     from dqslam.uncertainty import Bound as Bound
     from dqslam.uncertainty import Marginals as Marginals
+    from dqslam.uncertainty import UnderConstrained as UnderConstrained
     from dqslam.uncertainty import marginal_covariances as marginal_covariances
     from dqslam.uncertainty import posterior_bound as posterior_bound
 else:

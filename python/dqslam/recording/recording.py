@@ -75,6 +75,7 @@ class Recording:
         parts.append(in_words(self.detections))
         if self.positions is not None:
             parts.append(counted(len(self.positions), "position"))
+        parts += [counted(len(measured), measured.kind) for measured in self.measurements]
         return f"Recording({', '.join(parts)})"
 
 
