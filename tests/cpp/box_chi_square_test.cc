@@ -5,23 +5,13 @@
 
 #include <cmath>
 
+#include "cameras.h"
 #include "dqslam/costs/whitening.h"
 
 namespace dqslam {
 namespace {
 
 constexpr double kRadius = 0.5;
-
-Camera MakeCamera() {
-  Camera camera;
-  camera.fx = 500;
-  camera.fy = 400;
-  camera.cx = 320;
-  camera.cy = 240;
-  camera.width = 640;
-  camera.height = 480;
-  return camera;
-}
 
 EdgeFlags Flags(bool left, bool top, bool right, bool bottom) {
   return (EdgeFlags() << left, top, right, bottom).finished();

@@ -5,6 +5,7 @@
 
 #include <limits>
 
+#include "cameras.h"
 #include "oracle.h"
 #include "random.h"
 
@@ -12,17 +13,6 @@ namespace dqslam {
 namespace {
 
 using testing::HasSubstr;
-
-Camera MakeCamera() {
-  Camera camera;
-  camera.fx = 500;
-  camera.fy = 400;
-  camera.cx = 320;
-  camera.cy = 240;
-  camera.width = 640;
-  camera.height = 480;
-  return camera;
-}
 
 Camera DistortedCamera() {
   Camera camera = MakeCamera();

@@ -2,22 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include "cameras.h"
 #include "oracle.h"
 #include "random.h"
 
 namespace dqslam {
 namespace {
-
-Camera MakeCamera() {
-  Camera camera;
-  camera.fx = 500;
-  camera.fy = 400;
-  camera.cx = 320;
-  camera.cy = 240;
-  camera.width = 640;
-  camera.height = 480;
-  return camera;
-}
 
 // The tangent cone of a sphere of radius 3 at a distance of 5 has a slope of 3 / 4.
 TEST(ProjectToOutline, OfASphereStraightAheadByHand) {

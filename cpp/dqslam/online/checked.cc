@@ -31,7 +31,7 @@ std::vector<Observation> CheckedObservations(const StepObservations& given, int 
     Observation& box = observations.emplace_back();
     box.object = given.object[row];
     box.value = given.box.row(row).transpose();
-    box.sqrt_information = CheckedSqrtInformation<4>("box_covariance", given.covariance, row);
+    box.sqrt_information = SqrtInformationOfRow<4>("box_covariance", given.covariance, row);
     box.truncated = given.truncated.row(row);
   }
   for (const MeasurementTable& table : given.measurements) {
@@ -67,7 +67,7 @@ typename History<Pose>::Step CheckedStep(const Eigen::VectorXd& relative,
   CheckTable("odometry_covariance", covariance, k, k);
   step.covariance = covariance;
   const RowMatrix row = step.covariance.reshaped().transpose();
-  step.sqrt_information = CheckedSqrtInformation<k>("odometry_covariance", row, 0);
+  step.sqrt_information = SqrtInformationOfRow<k>("odometry_covariance", row, 0);
   return step;
 }
 

@@ -51,25 +51,13 @@ void CheckScenePriors(const ScenePriors& priors);
 /// Finite poses and landmarks of the right shapes; `name` is the state's.
 void CheckState(const std::string& name, const Graph& graph, const State& state);
 
-/// Square root of the information in one row of a table of covariances.
-template <int kSize>
-Eigen::Matrix<double, kSize, kSize> CheckedSqrtInformation(const std::string& table,
-                                                           const RowMatrix& covariances,
-                                                           Eigen::Index row) {
-  using Square = Eigen::Matrix<double, kSize, kSize, Eigen::RowMajor>;
-  try {
-    return SqrtInformation<kSize>(Eigen::Map<const Square>(covariances.row(row).data()));
-  } catch (const std::invalid_argument& error) {
-    FailAt(table, row, error.what());
-  }
-}
-
 /// The shape (rows, kSize^2), and that each row is a covariance.
 template <int kSize>
 void CheckCovariances(const std::string& table, const RowMatrix& covariances, Eigen::Index rows) {
   CheckTable(table, covariances, rows, kSize * kSize);
-  for (Eigen::Index row = 0; row < rows; ++row)
-    CheckedSqrtInformation<kSize>(table, covariances, row);
+  for (Eigen::Index row = 0; row < rows; ++row) {
+    SqrtInformationOfRow<kSize>(table, covariances, row);
+  }
 }
 
 }  // namespace dqslam
