@@ -13,10 +13,6 @@ namespace {
 
 constexpr double kRadius = 0.5;
 
-EdgeFlags Flags(bool left, bool top, bool right, bool bottom) {
-  return (EdgeFlags() << left, top, right, bottom).finished();
-}
-
 // Box i at the origin; what is not given is diagonal noise of 1 px.
 struct Boxes {
   explicit Boxes(int count)
@@ -50,7 +46,7 @@ TEST(BoxChiSquare, OfACutEdgeCountsWhereTheObjectEndsInside) {
   Boxes two(2);
   for (const int row : {0, 1}) {
     two.ellipsoids.row(row) = Sphere({0, 0, 10}, 1);
-    two.truncated.row(row) = Flags(false, false, true, false);
+    two.truncated.row(row) << false, false, true, false;
     const double half = 1 / std::sqrt(99.0);
     const double outwards = row == 0 ? 4 : -4;  // of the cut edge, from where the object ends
     two.boxes.row(row) << 320 - 500 * half, 240 - 400 * half, 320 + 500 * half + outwards,
@@ -84,7 +80,7 @@ TEST(BoxChiSquare, OfAPerfectEstimateIsZeroWhereTheBorderCutsTheBox) {
     boxes.boxes.row(row) << 320 + 500 * std::tan(azimuth - half_angle), 240 - 400 * half_height,
         border, 240 + 400 * half_height;
     EXPECT_LE(half_height, highest);
-    boxes.truncated.row(row) = Flags(false, false, true, false);
+    boxes.truncated.row(row) << false, false, true, false;
   }
   EXPECT_LT(boxes.ChiSquares().maxCoeff(), 1e-18);
   // Nor is it just that edges are ignored: an object that is too small does not fit.
