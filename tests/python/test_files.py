@@ -27,14 +27,22 @@ def test_what_was_there_or_has_files_stays(tmp_path):
     assert (tmp_path / "b" / "c" / "file").exists()
 
 
+@pytest.fixture
+def listening():
+    """Ctrl-C is heard, also where the shell that runs the tests ignores it in the background."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("listening")
 def test_ctrl_c_waits_until_the_files_are_there(tmp_path):
-    before = signal.getsignal(signal.SIGINT)
     with pytest.raises(KeyboardInterrupt), uninterrupted():
         os.kill(os.getpid(), signal.SIGINT)
         (tmp_path / "first").write_text("")
         (tmp_path / "second").write_text("")
     assert len(list(tmp_path.iterdir())) == 2
-    assert signal.getsignal(signal.SIGINT) is before
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 def test_an_error_is_not_hidden_and_ctrl_c_that_is_ignored_stays_so():
