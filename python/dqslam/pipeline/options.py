@@ -13,7 +13,7 @@ from dqslam.io import FormatNames, FrameTimes
 from dqslam.io.recording import Ids
 
 Progress = Callable[[float, str], None]
-"""Is told the share of the work that is done, 0 to 1, and in a line where a session stands."""
+"""Called with the share of the work that is done, 0 to 1, and a line on the step of a session."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -21,20 +21,20 @@ class RunOptions:
     """What may be chosen of a run."""
 
     trust_ids: float = FINAL
-    """Probability that an object id stays with its object, above 0.5 and at most 1: ids are final.
-    Without any ids it has no meaning."""
+    """Probability that an object id stays with its object, above 0.5; at 1 the ids are final.
+    A recording without any ids does not use it."""
     mode: _core.Mode = _core.Mode.SLAM
-    """SLAM improves the odometry, MAPPING takes it for the truth."""
+    """SLAM improves the odometry; MAPPING takes it for the truth."""
     box_noise: BoxNoise = BoxNoise()
     """How far the edges of boxes are off."""
     size_prior: SizePrior | SizePriors | None = None
-    """How large objects are; None learns one size for all from the objects that are found."""
+    """How large objects are, all of them or by class; None learns one size from those found."""
     estimates_noise: bool = False
     """Whether the level of the odometry's noise is estimated instead of believed."""
     hold_out: float = 0.0
     """Share of the boxes, at least 0 and below 1, that the map is tested on instead."""
     seed: int = 0
-    """Of the random choice of these boxes."""
+    """Seed of the random choice of these boxes."""
 
     def solve_options(self) -> _core.SolveOptions:
         """Return the solver's options: its loss forgives boxes that show something else."""
@@ -43,27 +43,28 @@ class RunOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class RunFilesOptions(RunOptions):
-    """What may be chosen of a run, and of how its files are read.
+    """What may be chosen of a run and of how its files are read.
 
-    Where nothing is said of the odometry's noise, its level is estimated.
+    The level of the odometry's noise is estimated if none of the three fields about it is set.
     """
 
     ids: Ids = "track_id"
-    """Column that tells which boxes show the same object; "none" leaves that open."""
+    """Column that tells which boxes show the same object; with "none" it is found out."""
     min_score: float = 0.5
-    """Boxes with a lower score are left out, 0 to 1."""
+    """Least score of a box, 0 to 1; boxes below are left out."""
     formats: FormatNames = FormatNames()
-    """Of the files, where their look does not tell."""
+    """Names of the formats of files that do not look like what they are."""
     frames: FrameTimes | None = None
-    """Times of frames, for files that only count them; None has frame 0 at 0 s, 1 at 1 s."""
+    """Times of frames, for files that only count them; None takes their numbers for seconds where
+    the trajectory counts frames, too."""
     max_time_difference: float | None = None
     """Seconds from a box to its pose; None is half the median interval between poses."""
     added_noise: OdometryNoise | None = None
-    """Noise to add to every step of the odometry, with the same seed."""
+    """Noise to add to every step of the odometry, drawn with ``seed``."""
     odometry_noise: OdometryNoise | None = None
     """What to believe of every step; None is the noise that was added, if any was."""
     odometry_covariance: str | Path | None = None
-    """In its place, CSV of the covariance of each step, m and rad squared."""
+    """CSV of the covariance of each step, m and rad squared; it replaces ``odometry_noise``."""
 
     @property
     def believed_noise(self) -> OdometryNoise | None:

@@ -32,7 +32,7 @@ def run(
 
     Edges of boxes on the border of the image bound the object from one side only. Objects that do
     not fit a world at rest are left out; without any object, the odometry is returned as it is.
-    Relative positions take no part.
+    Relative positions and other measurements take no part.
 
     Parameters
     ----------
@@ -46,7 +46,8 @@ def run(
     reference
         Trajectory to compare with, before and after: world_from_camera, in any world.
     progress
-        Is told the share of the work that is done, 0 to 1, and, online, a line on each step.
+        Called with the share of the work that is done, 0 to 1, and, online, with a line on each
+        step.
 
     Raises
     ------
@@ -69,7 +70,7 @@ def run(
         raise ValueError("online: a session improves the odometry, it has no mode MAPPING")
     if reference is not None:  # before the work: may they be compared?
         common_poses(recording.timestamps, reference)
-    recording = replace(with_cut_edges(recording), positions=None)
+    recording = replace(with_cut_edges(recording), positions=None, measurements=())
     boxes = recording.detections
     if isinstance(options.size_prior, SizePriors):
         options.size_prior.check_classes(set(boxes.class_names.values()))
