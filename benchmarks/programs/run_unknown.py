@@ -35,7 +35,7 @@ def main(case: str, seed: int = 0, noise: float | None = None) -> None:
         trust_ids=UNSURE,
     )
 
-    def tell(what: str, poses: Floats, shown: Ints | None, seconds: float) -> None:
+    def show(what: str, poses: Floats, shown: Ints | None, seconds: float) -> None:
         apart = (poses - problem.truth.poses)[:, :2]
         words = [f"{what}: RMSE {np.sqrt(np.mean(np.sum(apart**2, axis=1))):.3f} m"]
         if shown is not None:
@@ -53,17 +53,17 @@ def main(case: str, seed: int = 0, noise: float | None = None) -> None:
         + ", ".join(f"{key} {value:.3g}" for key, value in spread(taken).items())
         + " ms\n"
     )
-    tell("step by step", slam.poses, _by_box(slam, recording), taken.sum() / 1e3)
+    show("step by step", slam.poses, _by_box(slam, recording), taken.sum() / 1e3)
     started = time.perf_counter()
     slam.polish()
     seconds = time.perf_counter() - started
-    tell("polished", slam.poses, _by_box(slam, recording), seconds)
+    show("polished", slam.poses, _by_box(slam, recording), seconds)
     started = time.perf_counter()
     found = associate(unknown, estimates_noise=False, box_noise=NOISE)
     poses = fill_in(unknown, found.keyframes, found.scene.poses)
-    tell("associate", poses, found.object_id, time.perf_counter() - started)
+    show("associate", poses, found.object_id, time.perf_counter() - started)
     estimate, summary = solve(build_graph(recording, box_noise=NOISE))
-    tell("told the ids", estimate.poses, None, summary.seconds)
+    show("oracle ids", estimate.poses, None, summary.seconds)
 
 
 def _by_box(slam: OnlineSlam, recording: Recording) -> Ints:

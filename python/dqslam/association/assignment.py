@@ -11,7 +11,7 @@ _FORBIDDEN = 1e9
 
 
 def assign(cost: Floats, null: Floats) -> tuple[Ints, Floats]:
-    """Choose the assignment of least total cost, and tell how sure each of its pairs is.
+    """Choose the assignment of least total cost, and return how sure each of its pairs is.
 
     Parameters
     ----------

@@ -30,7 +30,7 @@ FINAL, UNSURE = 1.0, 0.9
 
 @dataclass(frozen=True, eq=False)
 class Association:
-    """Which boxes show the same object, and the estimate that says so."""
+    """Which boxes show the same object, and the estimate that goes with it."""
 
     object_id: Ints
     """Of each box of the recording, -1 for none, shape (m,)."""
@@ -112,7 +112,7 @@ def associate(
     estimates_noise
         Whether the level of the odometry's noise is estimated instead of believed.
     progress
-        Is told the share of the work that is done.
+        Called with the share of the work that is done.
 
     Raises
     ------
@@ -219,9 +219,9 @@ def _cut_alike(tracklet: Ints, pose: Ints, used: Bools, cut: Ints) -> Ints:
     return result
 
 
-def _numbered(box_object: Ints, count: int) -> tuple[Ints, Ints]:
+def _numbered(object_rows: Ints, count: int) -> tuple[Ints, Ints]:
     """Return ids by order of first boxes: of boxes (m,), and of rows (count,); -1 for none."""
-    rows, first = np.unique(box_object[box_object >= 0], return_index=True)
+    rows, first = np.unique(object_rows[object_rows >= 0], return_index=True)
     ids = np.full(count + 1, -1)
     ids[rows[np.argsort(first)]] = np.arange(len(rows))
-    return ids[box_object], ids[:-1]
+    return ids[object_rows], ids[:-1]

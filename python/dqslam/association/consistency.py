@@ -1,4 +1,4 @@
-"""Objects that are one, that moved, that are no objects: found by what their boxes say together."""
+"""Objects that are one, that moved, that are no objects: found by comparing their boxes."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ MOVER_MIN_CHI2 = 13.28
 # as boxes usually have.
 MOVER_MIN_COST_PER_BOX = 2.0
 MOVER_MIN_COST_RATIO = 2.0
-# A median of fewer boxes says nothing.
+# A median of fewer boxes is chance.
 MOVER_MIN_BOXES = 8
 # The path hardly changes any more after so many iterations without an object.
 MOVER_MAX_ITERATIONS = 8
@@ -91,7 +91,7 @@ def close_pairs(scene: SceneMap) -> list[tuple[ObjectRow, ObjectRow]]:
 
 
 def _are_seen_together(scene: SceneMap, a: ObjectRow, b: ObjectRow) -> bool:
-    """Tell whether images show both of two objects, more of them than by mistake."""
+    """Return whether images show both of two objects, more of them than by mistake."""
     pose = scene.recording.detections.pose
     first, second = (pose[scene.labels.object_rows == row] for row in (a, b))
     together = len(np.intersect1d(first, second))
@@ -177,7 +177,7 @@ def find_movers(
     labels = scene.labels
     shown = labels.shown_objects
     shown = shown[labels.takes_part[shown]]
-    if len(shown) < 2:  # nothing else tells the path
+    if len(shown) < 2:  # nothing else holds the path
         return {}
     asked = [
         row

@@ -8,7 +8,7 @@ import numpy as np
 
 from dqslam import _core
 from dqslam._checks import Floats, Ints
-from dqslam._ids import Tracklet
+from dqslam._ids import ObservationRow, Tracklet
 from dqslam.association.assignment import assign
 from dqslam.association.consistency import find_misfits, join_duplicates
 from dqslam.association.gating import CHI2_GATE, PredictedBoxes, in_image, pair_costs, predict_boxes
@@ -24,7 +24,7 @@ MISFITS_TO_CUT_TRACKLET = 3
 MAX_PARTS = 60
 MIN_POSES_PER_PART = 3
 # The level of the odometry's noise is estimated from so many poses on, after every third part:
-# fewer residuals say little, and an estimate of the level costs as much as one of the path.
+# fewer residuals determine little, and an estimate of the level costs as much as one of the path.
 MIN_POSES_FOR_NOISE = 10
 PARTS_PER_NOISE_ESTIMATE = 3
 # Iterations of the estimate after each part: the next part goes on from there.
@@ -46,10 +46,10 @@ class Follower:
         self.switch_cost = np.inf if self.final else 2.0 * float(np.log(trust / (1.0 - trust)))
         """What a box costs more with another object than that of its tracklet: -2 ln of odds."""
         self._misfits: dict[Tracklet, int] = {}  # images in a row
-        self._refused: dict[tuple[int, ...], int] = {}  # by a group's first boxes: its size
+        self._refused: dict[tuple[ObservationRow, ...], int] = {}  # sizes, by their first boxes
 
     def follow(self, scene: SceneMap, progress: Callable[[float], None]) -> None:
-        """Go along the whole path; ``progress`` is told the share that is done."""
+        """Go along the whole path; ``progress`` is called with the share that is done."""
         end = len(scene.recording.timestamps)
         size = max(MIN_POSES_PER_PART, -(-end // MAX_PARTS))
         for part, begin in enumerate(range(1, end, size)):

@@ -80,7 +80,7 @@ def _meeting(rays: Rays, pose: Ints, rows: Ints) -> list[Ints]:
 
 
 def _largest_group(rays: Rays, pose: Ints, rows: Ints) -> Bools:
-    """Let each pair of rays propose a sphere, and tell which boxes agree with the best of them."""
+    """Let each pair of rays propose a sphere; return which boxes agree with the best of them."""
     center, radius = _spheres(rays, pose, rows)
     if not len(center):
         return np.zeros(len(rows), dtype=bool)

@@ -21,7 +21,7 @@ MIN_PARALLAX = 0.05
 MIN_GROWTH = 0.15
 # An image is a keyframe unless this share of its tracklets are seen from where they were ...
 MAX_SHARE_UNCHANGED = 0.75
-# ... and the last keyframe shows this share of them: of fewer it says nothing.
+# ... and the last keyframe shows this share of them: fewer may be seen from anywhere.
 MIN_SHARE_KNOWN = 0.5
 
 

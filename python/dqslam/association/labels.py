@@ -87,7 +87,7 @@ class Labels:
         return flags
 
     def are_strangers(self, rows: Ints) -> Bools:
-        """Tell which boxes (b,) wait, of tracklets without an object."""
+        """Return which boxes (b,) wait, of tracklets without an object."""
         known = self.object_of_tracklet[self.tracklets[rows]] >= 0
         return (self.object_rows[rows] < 0) & ~known
 

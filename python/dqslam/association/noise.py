@@ -17,9 +17,10 @@ from dqslam.association.thinning import compose_covariance
 from dqslam.assumptions import OdometryNoise
 from dqslam.recording import Recording
 
-# Residuals by which a group must outweigh the belief that its level is right.
-_DAMPING = 1.0
-_LEAST = 1e-6
+# A group must outweigh this many residuals that agree with the level believed: few change little.
+PRIOR_RESIDUALS = 1.0
+# Meters and radians a step; less is no noise that boxes could show.
+MIN_SIGMA = 1e-6
 
 
 @dataclass(frozen=True)
@@ -64,6 +65,6 @@ def corrected(noise: OdometryNoise, fit: _core.Fit) -> OdometryNoise:
     ):
         squares = np.sum(fit.odometry_residuals[:, part] ** 2)
         redundancy = np.sum(1.0 - fit.odometry_leverage[:, part])
-        factor = np.sqrt((squares + _DAMPING) / (redundancy + _DAMPING))
-        better.append(max(value * float(factor), _LEAST))
+        factor = np.sqrt((squares + PRIOR_RESIDUALS) / (redundancy + PRIOR_RESIDUALS))
+        better.append(max(value * float(factor), MIN_SIGMA))
     return OdometryNoise(*better)

@@ -36,7 +36,7 @@ MIN_MARGIN_AFTERWARDS = 2.0
 def refine(
     scene: SceneMap, follower: Follower, progress: Callable[[float], None] = lambda share: None
 ) -> None:
-    """Make the map agree with itself; ``progress`` is told the share that is done."""
+    """Make the map agree with itself; ``progress`` is called with the share that is done."""
     labels = scene.labels
     for done in range(ROUNDS):
         settle(scene)

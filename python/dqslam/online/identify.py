@@ -1,4 +1,4 @@
-"""Which objects the boxes of a session show, where ids do not say it, or not for sure.
+"""Which objects the boxes of a session show, where they have no ids or ids that may be wrong.
 
 The association of whole recordings, step by step: boxes are linked to tracklets, keyframes are
 chosen, and at each of them the boxes are given to the objects that they clearly show, by the joint
@@ -88,7 +88,7 @@ class Identifier:
         return store.labels.object_rows[-len(rows) :]
 
     def _identify_keyframe(self) -> None:
-        """Find the objects of the last keyframe's boxes, and what else these say."""
+        """Find the objects of the last keyframe's boxes, start new ones, and judge all."""
         state, store = self._state, self._state.store
         local = local_map(state, self._budget.next_window(len(store.keyframes)))
         self._assign(local)
@@ -166,7 +166,7 @@ class Identifier:
             scene.estimate_noise()
 
     def _has_departed(self, row: ObjectRow) -> bool:
-        """Tell whether an object has gone out of view since the last judgment."""
+        """Return whether an object has gone out of view since the last judgment."""
         store = self._state.store
         seen = store.keyframes_of(row)
         absent = len(store.keyframes) - 1 - seen[-1] if len(seen) else 0

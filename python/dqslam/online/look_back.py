@@ -19,7 +19,7 @@ from dqslam.online.local_map import LocalMap
 WINDOW_KEYFRAMES = 40
 # Each keyframe saves so many windows for looks further back: as much work again, now or later.
 WINDOWS_SAVED_PER_KEYFRAME = 1.0
-# So many boxes of an object tell where it is: if the window has fewer, its last ones are looked at.
+# So many boxes determine where an object is: if the window has fewer, its last ones are looked at.
 BOXES_THAT_PLACE = 8
 # Objects are expected this far outside of the image, as a part of its size: the path may be off.
 IMAGE_MARGIN = 0.5

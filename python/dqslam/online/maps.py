@@ -18,7 +18,7 @@ from dqslam.recording import tangent_size
 
 # Sigmas of the center [m] and of the log axes, where a result has none: well measured, not exact.
 UNKNOWN_CENTER_SIGMA_M, UNKNOWN_LOG_SIGMA = 0.05, 0.1
-# An orientation is never known worse than by this [rad]: where axes are equal it says nothing.
+# The sigma of an orientation [rad] where axes are equal, which leaves it open.
 MAX_ANGLE_SIGMA = 0.5
 
 

@@ -321,7 +321,7 @@ class OnlineSlam:
         FileError
             For results that are missing or wrong.
         ValueError
-            When the boxes do not tell the pose.
+            When no pose explains the boxes, or two do.
         """
         known = load_map(directory, robot_from_camera)
         slam = cls(known.camera, options, **settings)

@@ -30,7 +30,7 @@ class Settings:
     trust: float
     """The probability that an id stays with its object, of boxes that are identified."""
     estimates_noise: bool
-    """Whether boxes tell the level of the odometry's noise."""
+    """Whether the level of the odometry's noise is estimated from boxes."""
 
 
 @dataclass(eq=False)
