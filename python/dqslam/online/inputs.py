@@ -97,11 +97,13 @@ def check_boxes(boxes: StepBoxes | None) -> CheckedBoxes:
     count = len(box)
     if box.shape != (count, 4):
         raise ValueError(f"boxes: expected shape (n, 4), got {box.shape}")
-    reject_rows("boxes", ~np.isfinite(box), "NaN or infinite", box)
+    if not np.isfinite(box).all():
+        reject_rows("boxes", ~np.isfinite(box), "NaN or infinite", box)
     object_id = np.asarray(boxes.object_id)
     if object_id.shape != (count,) or object_id.dtype.kind not in "iu":
         raise ValueError(f"object_id: expected {count} whole numbers")
-    reject_rows("object_id", object_id < -1, "not an object id", object_id)
+    if min(object_id.tolist()) < -1:  # a list of a few is faster than an array
+        reject_rows("object_id", object_id < -1, "not an object id", object_id)
     names = boxes.class_name or ("object",) * count
     if len(names) != count:
         raise ValueError(f"class_name: expected {count} names, got {len(names)}")
@@ -115,8 +117,11 @@ def check_boxes(boxes: StepBoxes | None) -> CheckedBoxes:
 def box_noise_rows(noise: BoxNoise, box: Floats) -> Floats:
     """Return the covariances of boxes (b, 4), shape (b, 16)."""
     rows = np.zeros((len(box), 16))
-    variance = noise.pixels**2 + (noise.relative * (box[:, 2:] - box[:, :2])) ** 2
-    rows[:, 0::10], rows[:, 5::10] = variance[:, :1], variance[:, 1:]  # of u and of v, twice
+    rows[:, ::5] = noise.pixels**2
+    if noise.relative:
+        variance = (noise.relative * (box[:, 2:] - box[:, :2])) ** 2
+        rows[:, 0::10] += variance[:, :1]  # of both edges in u
+        rows[:, 5::10] += variance[:, 1:]
     return rows
 
 

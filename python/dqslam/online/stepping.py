@@ -39,10 +39,10 @@ def take_step(
         checked = check_boxes(boxes)
         begin = None if count else state.begin
         relative, covariance = motion_arrays(odometry, begin, _step_covariance(state))
-        believed = checked.object_id if settings.believes_ids else np.full(len(checked.box), -1)
-        known = np.flatnonzero(believed >= 0)
-        ids = believed[known].tolist()
-        names = [checked.class_name[row] for row in known.tolist()]
+        believed = checked.object_id.tolist() if settings.believes_ids else []
+        known = [place for place, one in enumerate(believed) if one >= 0]
+        ids = [believed[place] for place in known]
+        names = [checked.class_name[place] for place in known]
         rows, new = registry.rows_of(ids)
         priors = [state.prior.of(names[place]) for place in new]
         object_rows = np.full(len(checked.box), -1, dtype=np.int32)
