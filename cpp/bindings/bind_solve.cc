@@ -116,10 +116,10 @@ void BindOptions(py::module_& m) {
       .def_readwrite("grow_poses",
                      &SolveOptions::grow_poses,
                      "GROW adds at least this number of poses at a time.")
-      .def_readwrite("grow_rotation",
-                     &SolveOptions::grow_rotation,
-                     "GROW adds more than grow_poses poses as long as the sigma of odometry's "
-                     "rotation over the added poses is at most this, in radians.")
+      .def_readwrite("grow_angle",
+                     &SolveOptions::grow_angle,
+                     "GROW adds more than grow_poses poses as long as odometry predicts the "
+                     "directions of objects with at most this sigma, in radians.")
       .def_readwrite("grow_iterations",
                      &SolveOptions::grow_iterations,
                      "The largest number of Levenberg-Marquardt iterations after each addition.")
@@ -171,8 +171,12 @@ void BindSolution(py::module_& m) {
                     "Time to order, factorize and solve linear systems in all stages, in seconds.")
       .def_readonly("converged",
                     &Summary::converged,
-                    "Whether the last stage met a stopping test and accepted a step.")
-      .def_readonly("message", &Summary::message, "The reason why the last stage ended.")
+                    "Whether the last stage met a stopping test, with no decrease of the cost left "
+                    "that its model sees, and nothing speaks against the result: the boxes fit, "
+                    "and so does the odometry.")
+      .def_readonly("message",
+                    &Summary::message,
+                    "The reason why the last stage ended, or what speaks against the result.")
       .def("__str__", &ToString)
       .def("__repr__", [](const Summary& s) { return "Summary(" + ToString(s) + ")"; });
   py::class_<Solution>(m, "Solution", "The result of solve.")

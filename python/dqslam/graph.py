@@ -123,8 +123,9 @@ def solve(
 ) -> tuple[Estimate, _core.Summary]:
     """Estimate poses and objects, from odometry or a given start; options default to the core's.
 
-    Objects that the landmark model left as no ellipsoid have NaN in `Estimate.ellipsoids`. With a
-    robust loss, objects that too few boxes fit are not in the estimate but in `Estimate.dropped`.
+    The default loss is robust: boxes that do not fit their object have no weight. Objects that too
+    few of their boxes fit are not in the estimate but in `Estimate.dropped`, with the reason.
+    Objects that the landmark model left as no ellipsoid have NaN in `Estimate.ellipsoids`.
 
     Examples
     --------
@@ -173,6 +174,8 @@ def _unfit(graph: Graph, inliers: Bools) -> dict[int, str]:
     needed = np.ceil(np.minimum(ENOUGH_INLIERS, ENOUGH_INLIER_SHARE * graph.observations))
     reasons = {}
     for row, object_id in enumerate(graph.object_ids.tolist()):
+        if fit[row] == graph.observations[row]:
+            continue
         if views[row] < FEWEST_INLIER_VIEWS:
             reasons[object_id] = (
                 f"seen in {views[row]} poses by boxes that fit, {FEWEST_INLIER_VIEWS} are needed"

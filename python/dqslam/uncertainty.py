@@ -10,7 +10,7 @@ import numpy as np
 
 from dqslam import _core
 from dqslam._checks import Bools, Floats, Ints, require
-from dqslam._core import LandmarkModel, Mode, SolveOptions
+from dqslam._core import LandmarkModel, Loss, Mode, SolveOptions
 from dqslam._repr import counted
 from dqslam.estimate import Estimate
 from dqslam.graph import Graph
@@ -97,7 +97,7 @@ def posterior_bound(graph: Graph, truth: Truth) -> Bound:
     """
     require(graph, Graph, "posterior_bound", "call build_graph(recording) first")
     require(truth, Truth, "posterior_bound", "recording, truth = simulate(scenario, seed=0)")
-    options = SolveOptions()
+    options = SolveOptions(loss=Loss.NONE)
     state = true_state(graph, truth, options)
     covariance = _marginals(graph.core, graph.object_ids, options, state)
     axes = 2 if graph.core.pose_model == _core.PoseModel.SE2 else 3

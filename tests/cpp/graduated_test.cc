@@ -1,5 +1,6 @@
 #include "dqslam/estimation/graduated.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "cost_checks.h"
@@ -79,7 +80,13 @@ TEST(RobustSolve, FindsTheTruthAndTheWrongBoxes) {
     for (int row = 0; row < boxes.size(); ++row) mistaken += solution.inliers[row] == wrong[row];
     EXPECT_LE(mistaken, 1) << "loss " << static_cast<int>(loss);
   }
-  const Solution plain = Solve(scene.graph, SolveOptions(), {});
+  const Solution by_default = Solve(scene.graph, SolveOptions(), {});
+  EXPECT_LT((by_default.poses - scene.truth.poses).leftCols<3>().cwiseAbs().maxCoeff(), 1e-3);
+  SolveOptions options;
+  options.loss = Loss::kNone;
+  const Solution plain = Solve(scene.graph, options, {});
+  EXPECT_FALSE(plain.summary.converged) << "a tenth of the boxes do not fit";
+  EXPECT_THAT(plain.summary.message, testing::HasSubstr("% of the boxes do not fit"));
   EXPECT_GT((plain.poses - scene.truth.poses).leftCols<3>().cwiseAbs().maxCoeff(), 0.05);
 }
 

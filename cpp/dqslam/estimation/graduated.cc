@@ -57,18 +57,20 @@ Summary GraduateNonConvexity(const SolveContext& context, State* state) {
       decided = decided && (weight == 0 || weight == 1);
       stage.weights[i] = weight;
     }
+    // Where every box fits from the start, there is nothing to graduate.
+    if (round == 0 && costs.size() > 0 && 2 * costs.maxCoeff() <= c2) break;
     Append(Optimize(context, stage, state), &total);
     if (truncated ? decided && round > 0 : mu <= 1) break;
     mu = truncated ? mu * kGraduation : std::max(mu / kGraduation, 1.0);
   }
-  // The final stage uses the inliers only and runs until it converges.
-  const std::vector<bool> inliers = InlierBoxes(context, *state);
-  for (size_t i = 0; i < stage.boxes.size(); ++i) stage.weights[i] = inliers[stage.boxes[i]];
-  stage.minimizer = context.options.minimizer;
-  stage.max_iterations = context.options.max_iterations;
-  stage.function_tolerance = context.options.function_tolerance;
-  Append(Optimize(context, stage, state), &total);
   return total;
+}
+
+Stage InlierStage(const SolveContext& context, const State& state) {
+  Stage stage = BatchStage(context);
+  stage.loss = Loss::kNone;
+  for (const bool is_inlier : InlierBoxes(context, state)) stage.weights.push_back(is_inlier);
+  return stage;
 }
 
 std::vector<bool> InlierBoxes(const SolveContext& context, const State& state) {

@@ -13,9 +13,13 @@ bool IsRobust(Loss loss);
 bool ThrowsBoxesOut(Loss loss);
 
 /// Graduated non-convexity, Yang et al. 2020, with truncated least squares or Geman-McClure.  It
-/// weights whole boxes; odometry is a known inlier.  It starts at the state and ends with weights
-/// that are 0 or 1.
+/// weights whole boxes; odometry is a known inlier.  It starts at the state, and ends when it is
+/// clear which boxes fit.
 Summary GraduateNonConvexity(const SolveContext& context, State* state);
+
+/// The last stage of all variables, with weight 1 for the boxes that fit at the state and weight 0
+/// for the others.
+Stage InlierStage(const SolveContext& context, const State& state);
 
 /// Boxes whose chi-square at the state is at most options.outlier_chi_square.
 std::vector<bool> InlierBoxes(const SolveContext& context, const State& state);

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <limits>
 #include <numeric>
 
 #include "dqslam/estimation/grow.h"
@@ -17,6 +19,11 @@ constexpr double kImpossibleSize = 21.1;  // chi-square of 3 degrees of freedom,
 constexpr double kTorn = 5;               // chi-square of odometry, per degree of freedom
 constexpr int kMaxRestarts = 2;
 constexpr int kFewBoxes = 3;
+// Where this share of an object's boxes do not fit, they may be of several objects.  The object is
+// then started from some successive boxes at different parts of the path.
+constexpr double kMixed = 0.25;
+constexpr int kSomeBoxes = 4;
+constexpr int kParts = 6;
 
 // Replaces the state by an attempt if that has a lower cost.
 bool KeepIfBetter(const State& attempt, const Summary& total, State* state, Summary* summary) {
@@ -37,22 +44,84 @@ bool HasImpossibleSize(const SolveContext& context, const State& state, int obje
   return error.square().sum() > kImpossibleSize * std::pow(prior.log_sigma[object], 2);
 }
 
-// The stage of one object by itself: all its boxes, with constant poses.
-Stage StageOfObject(const SolveContext& context, int object) {
-  Stage stage = BatchStage(context);
-  stage.boxes = context.prepared.boxes_of_object[object];
-  stage.end_pose = stage.first_free_pose = context.graph().boxes.pose[stage.boxes.back()] + 1;
+// The part of a stage that is one object by itself: some boxes of weight 1, with constant poses.
+Stage StageOfObject(const Stage& all, const std::vector<int>& boxes, const Graph& graph) {
+  Stage stage = all;
+  stage.boxes = boxes;
+  stage.weights.clear();
+  stage.end_pose = stage.first_free_pose = graph.boxes.pose[boxes.back()] + 1;
   return stage;
+}
+
+double WeightOf(const Stage& stage, size_t i) {
+  return stage.weights.empty() ? 1 : stage.weights[i];
+}
+
+// The rows of the boxes of a batch stage that have a weight, by object and in the order of poses.
+std::vector<std::vector<int>> WeightedBoxes(const SolveContext& context, const Stage& stage) {
+  std::vector<std::vector<int>> result;
+  for (const std::vector<int>& rows : context.prepared.boxes_of_object) {
+    result.emplace_back();
+    std::copy_if(rows.begin(), rows.end(), std::back_inserter(result.back()), [&](int row) {
+      return WeightOf(stage, row) > 0;
+    });
+  }
+  return result;
+}
+
+// From cameras at one height, an ellipsoid that is tilted the other way looks almost the same.  The
+// two are minima of their own.
+bool CanTiltEitherWay(const SolveContext& context) {
+  return context.graph().pose_model == PoseModel::kSe2 &&
+         context.options.landmark_model == LandmarkModel::kEllipsoid;
+}
+
+// Starts from which an object may reach a better minimum than the one it is in; none where nothing
+// speaks against that one.
+std::vector<Vector9d> OtherStarts(const SolveContext& context,
+                                  const Stage& all,
+                                  const State& state,
+                                  const Eigen::VectorXd& costs,
+                                  int object,
+                                  const std::vector<int>& boxes) {
+  SolveOptions options = context.options;
+  options.start = Start::kSizePrior;
+  const SolveContext by_size{context.prepared, options, context.monitor};
+  const int count = static_cast<int>(boxes.size());
+  const auto misfits = std::count_if(boxes.begin(), boxes.end(), [&](int row) {
+    return !(2 * costs[row] <= kImpossibleBox);
+  });
+  const bool is_mixed = count > kSomeBoxes && misfits > kMixed * count;
+  std::vector<Vector9d> starts;
+  if (count <= kFewBoxes || is_mixed || HasImpossibleSize(context, state, object)) {
+    starts.push_back(StartObject(by_size, state, object, boxes));
+  }
+  if (all.loss == Loss::kNone && CanTiltEitherWay(context)) {
+    Vector9d tilted = state.landmarks.row(object);
+    tilted.tail<2>() *= -1;
+    starts.push_back(tilted);
+  }
+  for (int part = 0; is_mixed && part < kParts; ++part) {
+    const auto first = boxes.begin() + part * (count - kSomeBoxes) / (kParts - 1);
+    starts.push_back(StartObject(context, state, object, {first, first + kSomeBoxes}));
+  }
+  return starts;
 }
 
 }  // namespace
 
-std::vector<bool> StuckObjects(const SolveContext& context, const State& state) {
+std::vector<bool> StuckObjects(const SolveContext& context,
+                               const Stage& stage,
+                               const State& state) {
   const Eigen::VectorXd costs = BoxCosts(context, state);
   std::vector<bool> stuck;
-  for (const std::vector<int>& rows : context.prepared.boxes_of_object) {
+  for (const std::vector<int>& rows : WeightedBoxes(context, stage)) {
     std::vector<double> chi_squares;
     for (const int row : rows) chi_squares.push_back(2 * costs[row]);
+    if (chi_squares.empty()) {
+      stuck.push_back(false);
+      continue;
+    }
     const auto middle = chi_squares.begin() + chi_squares.size() / 2;
     std::nth_element(chi_squares.begin(), middle, chi_squares.end());
     const double sum = std::accumulate(chi_squares.begin(), chi_squares.end(), 0.0);
@@ -94,24 +163,28 @@ Stage BatchStage(const SolveContext& context) {
   return stage;
 }
 
-void RestartStuckObjects(const SolveContext& context, State* state, Summary* summary) {
-  const Stage all = BatchStage(context);
+void RestartStuckObjects(const SolveContext& context,
+                         const Stage& all,
+                         State* state,
+                         Summary* summary) {
+  const std::vector<std::vector<int>> boxes_of_object = WeightedBoxes(context, all);
   for (int restart = 0; restart < kMaxRestarts; ++restart) {
-    const std::vector<bool> stuck = StuckObjects(context, *state);
+    const std::vector<bool> stuck = StuckObjects(context, all, *state);
     if (std::none_of(stuck.begin(), stuck.end(), [](bool is_stuck) { return is_stuck; })) return;
 
     State attempt = *state;
     Stage rest = all;
-    rest.boxes.clear();
-    for (const int row : all.boxes) {
-      if (!stuck[context.graph().boxes.object[row]]) rest.boxes.push_back(row);
+    rest.weights.clear();
+    for (size_t i = 0; i < all.boxes.size(); ++i) {
+      const bool is_stuck = stuck[context.graph().boxes.object[all.boxes[i]]];
+      rest.weights.push_back(is_stuck ? 0 : WeightOf(all, i));
     }
     Summary total = *summary;
     Append(Optimize(context, rest, &attempt), &total);
     for (int object = 0; object < context.graph().num_objects(); ++object) {
       if (!stuck[object]) continue;
       attempt.landmarks.row(object) =
-          StartObject(context, attempt, object, context.prepared.boxes_of_object[object]);
+          StartObject(context, attempt, object, boxes_of_object[object]);
     }
     Stage towards = all;
     towards.residual = Residual::kTangent;
@@ -122,29 +195,48 @@ void RestartStuckObjects(const SolveContext& context, State* state, Summary* sum
   }
 }
 
-void TryOtherDepths(const SolveContext& context, State* state, Summary* summary) {
-  SolveOptions options = context.options;
-  options.start = Start::kSizePrior;
-  const SolveContext by_size{context.prepared, options, context.monitor};
+void Recover(const SolveContext& context, const Stage& all, State* state, Summary* summary) {
+  if (summary->converged) return;
+  Stage robust = all;
+  robust.loss = Loss::kCauchy;
+  State attempt = *state;
+  Summary total = *summary;
+  Append(Optimize(context, robust, &attempt), &total);
+  Append(Optimize(context, all, &attempt), &total);
+  KeepIfBetter(attempt, total, state, summary);
+}
+
+void TryOtherStarts(const SolveContext& context,
+                    const Stage& all,
+                    State* state,
+                    Summary* summary) {
   State attempt = *state;
   Summary total = *summary;
   bool any = false;
+  const std::vector<std::vector<int>> boxes_of_object = WeightedBoxes(context, all);
+  const Eigen::VectorXd costs = BoxCosts(context, *state);
   for (int object = 0; object < context.graph().num_objects(); ++object) {
-    const std::vector<int>& boxes = context.prepared.boxes_of_object[object];
-    const bool is_few = static_cast<int>(boxes.size()) <= kFewBoxes;
-    if (!is_few && !HasImpossibleSize(context, *state, object)) continue;
-    const Stage alone = StageOfObject(context, object);
-    State moved = attempt;
-    moved.landmarks.row(object) = StartObject(by_size, moved, object, boxes);
-    const Summary there = Optimize(context, alone, &moved);
+    const std::vector<int>& boxes = boxes_of_object[object];
+    if (boxes.empty()) continue;
+    const Stage alone = StageOfObject(all, boxes, context.graph());
+    State best = attempt;
+    double lowest = std::numeric_limits<double>::infinity();
+    for (const Vector9d& start : OtherStarts(context, all, attempt, costs, object, boxes)) {
+      State moved = attempt;
+      moved.landmarks.row(object) = start;
+      const double cost = Optimize(context, alone, &moved).final_cost;
+      if (cost >= lowest) continue;
+      lowest = cost;
+      best = moved;
+    }
+    if (std::isinf(lowest)) continue;
     State stayed = attempt;
-    const Summary here = Optimize(context, alone, &stayed);
-    if (!(there.final_cost < here.final_cost)) continue;
-    attempt.landmarks.row(object) = moved.landmarks.row(object);
+    if (!(lowest < Optimize(context, alone, &stayed).final_cost)) continue;
+    attempt.landmarks.row(object) = best.landmarks.row(object);
     any = true;
   }
   if (!any) return;
-  Append(Optimize(context, BatchStage(context), &attempt), &total);
+  Append(Optimize(context, all, &attempt), &total);
   KeepIfBetter(attempt, total, state, summary);
 }
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
+#include <string>
 
 #include "dqslam/estimation/graduated.h"
 #include "dqslam/estimation/grow.h"
@@ -12,6 +14,12 @@
 
 namespace dqslam {
 namespace {
+
+constexpr int kAttempts = 3;
+constexpr int kMaxRounds = 10;
+// The largest share of boxes beyond the 99.9 % quantile.
+constexpr double kMostMisfits = 0.05;
+constexpr double kSameCost = 10;  // half squared sigmas
 
 void ValidateOptions(const SolveOptions& options) {
   const auto require = [](bool good, const char* what) {
@@ -23,7 +31,7 @@ void ValidateOptions(const SolveOptions& options) {
   require(options.max_iterations > 0, "max_iterations must be positive");
   require(options.function_tolerance > 0, "function_tolerance must be positive");
   require(options.grow_poses > 0, "grow_poses must be positive");
-  require(options.grow_rotation >= 0, "grow_rotation must not be negative");
+  require(options.grow_angle >= 0, "grow_angle must not be negative");
   require(options.grow_iterations > 0, "grow_iterations must be positive");
   require(options.grow_min_views > 0, "grow_min_views must be positive");
 }
@@ -44,13 +52,31 @@ class Solver {
         graph_(context.graph()),
         options_(context.options) {}
 
-  /// Whether objects remain that are impossible given their boxes.
-  bool LeavesObjectsStuck(const State& state) const {
-    const std::vector<bool> stuck = StuckObjects(context_, state);
-    return std::any_of(stuck.begin(), stuck.end(), [](bool is_stuck) { return is_stuck; });
+  /// Why a state cannot be the answer, in words; empty if nothing speaks against it.
+  std::string Objection(const State& state) const {
+    if (!Refines()) return "";
+    const Mask inliers = FitsAt(state, kBoxChiSquare999);
+    const double misfits = 1.0 - inliers.cast<double>().mean();
+    if (misfits > kMostMisfits) {
+      return std::to_string(static_cast<int>(std::round(100 * misfits))) +
+             " % of the boxes do not fit";
+    }
+    if (IsTorn(prepared_, state)) return "the path does not fit the odometry";
+    const std::vector<bool> stuck = StuckObjects(context_, BatchStage(context_), state);
+    const auto count = std::count(stuck.begin(), stuck.end(), true);
+    if (!IsRobust(options_.loss) && count > 0) {
+      return std::to_string(count) + " objects do not fit their boxes";
+    }
+    return "";
   }
 
-  bool LeavesPathTorn(const State& state) const { return IsTorn(prepared_, state); }
+  /// The cost by which attempts are compared: that of the boxes that fit, and the threshold for
+  /// each of the others.
+  double TruncatedCost(const State& state, const Summary& summary) const {
+    if (!Graduates()) return summary.final_cost;
+    const auto misfits = (!Inliers(state)).count();
+    return summary.final_cost + 0.5 * options_.outlier_chi_square * misfits;
+  }
 
   /// Singular values of every object's SVD fit at the initial poses; NaN for fewer than 3 views.
   RowMatrix SvdSingularValues() const {
@@ -63,12 +89,7 @@ class Solver {
     return values;
   }
 
-  Mask Inliers(const State& state) const {
-    const std::vector<bool> inliers = InlierBoxes(context_, state);
-    Mask mask(inliers.size());
-    std::copy(inliers.begin(), inliers.end(), mask.begin());
-    return mask;
-  }
+  Mask Inliers(const State& state) const { return FitsAt(state, options_.outlier_chi_square); }
 
   Summary Run(const std::optional<State>& start, State* state) {
     state->switches = Eigen::VectorXd::Ones(graph_.boxes.size());
@@ -82,34 +103,61 @@ class Solver {
       const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - begin;
       summary.start_seconds = elapsed.count();
     }
-    if (ThrowsBoxesOut(options_.loss)) {
-      Append(Batch(BatchStage(context_).residual, Loss::kCauchy, state), &summary);
+    Stage last = BatchStage(context_);
+    if (ThrowsBoxesOut(options_.loss) || (!start && Refines() && Grows())) {
+      Stage robust = last;
+      robust.loss = Loss::kCauchy;
+      if (!ThrowsBoxesOut(options_.loss)) robust.function_tolerance = options_.grow_tolerance;
+      Append(Batch(robust, state), &summary);
+      if (!start && Refines()) {
+        RestartStuckObjects(context_, robust, state, &summary);
+        TryOtherStarts(context_, robust, state, &summary);
+      }
     }
-    if (options_.loss == Loss::kGncTls || options_.loss == Loss::kGncGm) {
+    if (Graduates()) {
       Append(GraduateNonConvexity(context_, state), &summary);
-      return summary;
+      last = InlierStage(context_, *state);
     }
     if (options_.loss == Loss::kSwitchable) SetSwitches(state);
-    Append(Batch(BatchStage(context_).residual, options_.loss, state), &summary);
+    Append(Batch(last, state), &summary);
+    // Each round can only lower the truncated cost, and ends when the same boxes fit as before.
+    for (int round = 0; Graduates() && round < kMaxRounds; ++round) {
+      const Stage next = InlierStage(context_, *state);
+      if (next.weights == last.weights) break;
+      last = next;
+      Append(Batch(last, state), &summary);
+    }
     if (Refines()) {
-      RestartStuckObjects(context_, state, &summary);
-      TryOtherDepths(context_, state, &summary);
+      Recover(context_, last, state, &summary);
+      RestartStuckObjects(context_, last, state, &summary);
+      TryOtherStarts(context_, last, state, &summary);
     }
     return summary;
   }
 
  private:
   bool Refines() const { return options_.residual == Residual::kTangentThenBox; }
+  bool Graduates() const {
+    return options_.loss == Loss::kGncTls || options_.loss == Loss::kGncGm;
+  }
+  bool Grows() const {
+    return options_.schedule == Schedule::kGrow && options_.mode == Mode::kSlam;
+  }
+
+  Mask FitsAt(const State& state, double chi_square) const {
+    return 2 * BoxCosts(context_, state).array() <= chi_square;
+  }
 
   Summary ReachStart(State* state) {
     state->poses = graph_.initial_poses;
     state->landmarks = RowMatrix::Zero(graph_.num_objects(), kLandmarkSize);
-    if (options_.schedule == Schedule::kGrow && options_.mode == Mode::kSlam) {
-      return Grow(context_, state);
-    }
+    if (Grows()) return Grow(context_, state);
     StartAll(state);
-    const Loss loss = IsRobust(options_.loss) ? Loss::kCauchy : Loss::kNone;
-    return Refines() ? Batch(Residual::kTangent, loss, state) : Summary();
+    if (!Refines()) return Summary();
+    Stage stage = BatchStage(context_);
+    stage.residual = Residual::kTangent;
+    stage.loss = IsRobust(options_.loss) ? Loss::kCauchy : Loss::kNone;
+    return Batch(stage, state);
   }
 
   // Sets each switch to the minimum of s^2 chi^2 + phi (1 - s)^2.  If all switches were 1, the
@@ -126,11 +174,9 @@ class Solver {
     }
   }
 
-  Summary Batch(Residual residual, Loss loss, State* state) {
-    Stage stage = BatchStage(context_);
-    stage.residual = residual;
-    stage.loss = loss;
-    const bool all_defined = residual != Residual::kBox || BoxCosts(context_, *state).allFinite();
+  Summary Batch(const Stage& stage, State* state) {
+    const bool all_defined =
+        stage.residual != Residual::kBox || BoxCosts(context_, *state).allFinite();
     Summary summary = Optimize(context_, stage, state);
     // Boxes that were undefined at the start of the stage have used the tangent residual so far.
     if (!all_defined) Append(Optimize(context_, stage, state), &summary);
@@ -143,32 +189,45 @@ class Solver {
   const SolveOptions& options_;
 };
 
-// Grows again in smaller steps, up to two times, if objects are stuck, the path is torn or the last
-// stage did not converge.  Keeps the result with the lowest cost.  With a robust loss, all boxes of
-// an object may be outliers, so these tests do not apply: it grows once, in smaller steps.
+// Solves up to three times, by growing in smaller steps each time, as long as something speaks
+// against the result, and keeps the result with the lowest cost.  Two attempts that come to the same
+// cost confirm each other, however many boxes do not fit.
 Summary SolveInAttempts(const SolveContext& context,
                         const std::optional<State>& start,
                         State* state) {
   const SolveOptions& options = context.options;
-  const bool repeats = !start && options.mode == Mode::kSlam && options.loss == Loss::kNone &&
+  const bool repeats = !start && options.mode == Mode::kSlam &&
+                       (options.loss == Loss::kNone || options.loss == Loss::kGncTls ||
+                        options.loss == Loss::kGncGm) &&
                        options.schedule == Schedule::kGrow &&
                        options.residual == Residual::kTangentThenBox;
   SolveOptions variant = options;
   Summary best;
-  for (int attempt = 0; attempt < (repeats ? 3 : 1); ++attempt) {
-    const int halvings = 2 * (IsRobust(options.loss) ? 1 : attempt);
-    variant.grow_poses = std::max(options.grow_poses >> halvings, 1);
-    variant.grow_rotation = options.grow_rotation / (1 << halvings);
+  double lowest = std::numeric_limits<double>::infinity();
+  for (int attempt = 0; attempt < (repeats ? kAttempts : 1); ++attempt) {
+    variant.grow_poses = std::max(options.grow_poses >> (2 * attempt), 1);
+    variant.grow_angle = options.grow_angle / (1 << (2 * attempt));
     Solver solver({context.prepared, variant, context.monitor});
     State reached;
-    const Summary summary = solver.Run(start, &reached);
-    if (attempt == 0 || summary.final_cost < best.final_cost) {
-      best = summary;
-      *state = reached;
+    Summary summary = solver.Run(start, &reached);
+    const std::string objection = solver.Objection(reached);
+    const double cost = solver.TruncatedCost(reached, summary);
+    const bool confirmed = options.loss != Loss::kNone && std::abs(cost - lowest) < kSameCost;
+    if (summary.converged && !objection.empty() && !confirmed) {
+      summary.converged = false;
+      summary.message = objection;
     }
-    if (best.converged && !solver.LeavesObjectsStuck(*state) && !solver.LeavesPathTorn(*state)) {
+    if (confirmed && cost >= lowest) {
+      best.converged = summary.converged;
+      best.message = summary.message;
       break;
     }
+    if (attempt == 0 || cost < lowest) {
+      best = summary;
+      *state = reached;
+      lowest = cost;
+    }
+    if (best.converged) break;
   }
   return best;
 }

@@ -102,8 +102,10 @@ struct Summary {
   double start_seconds = 0;          ///< the part of `seconds` until all objects had a start
   double evaluation_seconds = 0;     ///< time for residuals and their derivatives, all stages
   double linear_solver_seconds = 0;  ///< time to order, factorize and solve, all stages
-  bool converged = false;            ///< the last stage met a stopping test and accepted a step
-  std::string message;               ///< the reason why the last stage ended
+  /// Whether the last stage met a stopping test, with no decrease of the cost left that its model
+  /// sees, and nothing speaks against the result: the boxes fit, and so does the odometry.
+  bool converged = false;
+  std::string message;  ///< the reason why the last stage ended, or what speaks against the result
 };
 
 /// Adds a stage to the summary of all stages so far.  Counts and times add up, initial_cost remains

@@ -64,12 +64,14 @@ struct SolveOptions {
   LandmarkModel landmark_model = LandmarkModel::kEllipsoid;
   Start start = Start::kSphere;
   Schedule schedule = Schedule::kGrow;
-  Loss loss = Loss::kNone;
+  /// The default survives wrong ids and false boxes.  Where all boxes fit, it ends with the plain sum
+  /// of squares.
+  Loss loss = Loss::kGncTls;
   /// Scale of the Huber and Cauchy losses, in sigmas of a whole box.
   double loss_scale = 2.0;
   /// A box whose chi-square exceeds this is an outlier.  It is the threshold of all robust losses
-  /// but Huber and Cauchy.  The default is the 99 % quantile with 4 degrees of freedom.
-  double outlier_chi_square = kBoxChiSquare99;
+  /// but Huber and Cauchy.  The default is the 99.9 % quantile with 4 degrees of freedom.
+  double outlier_chi_square = kBoxChiSquare999;
   /// Sigma of both algebraic residuals, in the unit of the residual.
   double algebraic_sigma = 1.0;
   Backend backend = Backend::kNative;
@@ -78,10 +80,10 @@ struct SolveOptions {
   /// A batch stage stops when |change of cost| / cost is at most this.
   double function_tolerance = 1e-7;
   /// Growing adds at least this number of poses at a time.
-  int grow_poses = 64;
-  /// Growing adds more than grow_poses poses as long as the sigma of odometry's rotation over the
-  /// added poses is at most this, in radians.
-  double grow_rotation = 0.25;
+  int grow_poses = 8;
+  /// Growing adds more than grow_poses poses as long as odometry predicts the directions of objects
+  /// with at most this sigma, in radians.
+  double grow_angle = 0.25;
   int grow_iterations = 10;  ///< the most Levenberg-Marquardt iterations after each addition
   /// The minimization after an addition stops when |change of cost| / cost is at most this.
   double grow_tolerance = 1e-2;

@@ -66,6 +66,11 @@ Summary Summarize(const ceres::Solver::Summary& ceres_summary, const MonitorCall
   summary.gradient_norm_start = callback.first_gradient_norm;
   summary.gradient_norm_end = callback.last_gradient_norm;
   summary.converged = ceres_summary.termination_type == ceres::CONVERGENCE;
+  // Ceres also calls it convergence where no step was good and the last one was short.
+  if (summary.rejected_steps > 0 && summary.rejected_steps == summary.iterations) {
+    summary.converged = false;
+    summary.message = "every step was rejected: " + summary.message;
+  }
   return summary;
 }
 

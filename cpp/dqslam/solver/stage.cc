@@ -31,10 +31,6 @@ Summary Optimize(const SolveContext& context, const Stage& stage, State* state) 
     summary = Minimize(method, context.monitor, problem.get(), &values);
     problem->Unpack(values, state);
   }
-  if (summary.rejected_steps > 0 && summary.rejected_steps == summary.iterations) {
-    summary.converged = false;
-    summary.message = "every step was rejected: " + summary.message;
-  }
   return summary;
 }
 

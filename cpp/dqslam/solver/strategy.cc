@@ -36,6 +36,7 @@ class LevenbergMarquardt : public Strategy {
     shrinkage_ *= 2;
   }
   void RejectInvalid() override { Reject(); }
+  bool IsLimited() const override { return radius_ < 1; }
 
  private:
   VectorXd curvature_;
@@ -119,6 +120,10 @@ bool Strategy::Solve(const NormalEquations& equations, const VectorXd& damping, 
   if (!cholesky_.Factorize(equations.H, damping)) return false;
   *step = cholesky_.Solve(-equations.gradient);
   return step->allFinite();
+}
+
+bool Strategy::StepWithoutLimit(const NormalEquations& equations, VectorXd* step) {
+  return Solve(equations, kLeastDamping * Curvature(equations), step);
 }
 
 std::unique_ptr<Strategy> MakeStrategy(Minimizer minimizer, const BlockMatrix& H) {

@@ -22,6 +22,9 @@ class Strategy {
   /// Computes the step.  `is_new` is false if the equations are those of the last call.  Returns
   /// false where there is no step.
   virtual bool Step(const NormalEquations& equations, bool is_new, Eigen::VectorXd* step) = 0;
+  /// Computes the step that the model would take without a trust region.  Returns false where there
+  /// is no such step.
+  bool StepWithoutLimit(const NormalEquations& equations, Eigen::VectorXd* step);
   virtual void Accept(double gain_ratio) = 0;
   virtual void Reject() = 0;
   virtual void RejectInvalid() = 0;

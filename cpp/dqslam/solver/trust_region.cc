@@ -1,5 +1,6 @@
 #include "dqslam/solver/trust_region.h"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <limits>
@@ -16,6 +17,9 @@ constexpr double kSmallestRadius = 1e-32;
 constexpr double kSufficientDecrease = 1e-3;  // of the decrease that the model predicts
 constexpr double kTinyStep = 1e-12;           // relative to the values
 constexpr double kTinyGradient = 1e-12;
+// Where steps have become tiny, the model must not promise a larger decrease than this, as a share
+// of the cost (of 1 for a cost below 1, which is in squared sigmas).
+constexpr double kBrokenPromise = 1e-3;
 // An invalid step leads into impossible geometry.  The trust region shrinks and the loop continues.
 constexpr int kMaxInvalidSteps = 50;
 
@@ -114,6 +118,18 @@ Summary Minimize(const TrustRegionOptions& options,
     const Stopwatch linear_solver(&summary.linear_solver_seconds);
     strategy = MakeStrategy(options.minimizer, equations.H);
   }
+  // Stops because no step is short enough.  That is a minimum only if the model sees no decrease.
+  const auto stop_short = [&](std::string message) {
+    VectorXd full;
+    const Stopwatch linear_solver(&summary.linear_solver_seconds);
+    const bool has_step = strategy->StepWithoutLimit(equations, &full);
+    const double promise = has_step ? -0.5 * full.dot(equations.gradient) : 0;
+    if (has_step && promise <= kBrokenPromise * std::max(equations.cost, 1.0)) {
+      converge(std::move(message));
+    } else {
+      summary.message = Message("jammed: a decrease of", promise, "is left at cost", equations.cost);
+    }
+  };
   VectorXd step;
   Trial trial(problem);
   bool is_new = true;
@@ -125,7 +141,7 @@ Summary Minimize(const TrustRegionOptions& options,
       break;
     }
     if (strategy->radius() < kSmallestRadius) {
-      converge(Message("trust region", strategy->radius(), "<", kSmallestRadius));
+      stop_short(Message("trust region", strategy->radius(), "<", kSmallestRadius));
       break;
     }
     ++summary.iterations;
@@ -146,13 +162,13 @@ Summary Minimize(const TrustRegionOptions& options,
     }
     invalid_steps = 0;
     if (step.norm() <= kTinyStep * (values->norm() + kTinyStep)) {
-      converge(Message("step", step.norm(), "<=", kTinyStep * values->norm()));
+      stop_short(Message("step", step.norm(), "<=", kTinyStep * values->norm()));
       break;
     }
 
     const Stopwatch evaluation(&summary.evaluation_seconds);
     const double decrease = trial.Take(*values, step, predicted);
-    if (!strategy->IsLimited() &&
+    if (!strategy->IsLimited() && predicted <= kBrokenPromise * std::max(equations.cost, 1.0) &&
         std::abs(decrease) <= options.function_tolerance * equations.cost) {
       converge(Message(
           "relative change of cost", decrease / equations.cost, "<=", options.function_tolerance));

@@ -103,7 +103,8 @@ class OnlineSlam:
             pose_model = pose_model_of("first_pose", given)
         self.camera = camera
         self.pose_model = pose_model
-        self.solve_options = _core.SolveOptions() if options is None else options
+        plain = _core.SolveOptions(loss=_core.Loss.NONE)
+        self.solve_options = plain if options is None else options
         if self.solve_options.landmark_model != _core.LandmarkModel.ELLIPSOID:
             raise ValueError("online: only the ellipsoid model has a prior on size")
         online = _core.OnlineOptions() if online is None else online
