@@ -22,7 +22,7 @@ from dqslam.studies.ablation import (
 PAPER = load_scenario("paper")
 OURS = Variant()
 PAPERS = Variant(Residual.ALGEBRAIC, Start.IDENTITY, Schedule.BATCH)
-TOLD = Variant(wrong_ids="random", told=True)
+ORACLE = Variant(wrong_ids="random", oracle=True)
 GNC = Variant(wrong_ids="random", loss=Loss.GNC_TLS)
 
 
@@ -42,7 +42,7 @@ def test_every_part_is_tried_once():
     assert len(ROBUST_VARIANTS) == 2 * (len(Loss) + 1)
     assert OURS in CLEAN_VARIANTS
     assert {variant.loss for variant in CLEAN_VARIANTS} == {Loss.NONE}
-    assert [variant.loss for variant in ROBUST_VARIANTS if variant.told] == [Loss.NONE] * 2
+    assert [variant.loss for variant in ROBUST_VARIANTS if variant.oracle] == [Loss.NONE] * 2
 
 
 def test_only_what_is_named_differs_from_the_default():
@@ -65,10 +65,10 @@ def test_ours_reaches_the_optimum_and_the_papers_does_not(table):
 
 
 def test_a_back_end_makes_up_for_wrong_ids():
-    table = run_ablation(PAPER, trials=1, seed=6, variants=(TOLD, GNC))
-    told, gnc = row_of(table, TOLD), row_of(table, GNC)
-    assert told.optimum_rate == 1.0
-    assert gnc.error_over_bound < 1.3 * told.error_over_bound
+    table = run_ablation(PAPER, trials=1, seed=6, variants=(ORACLE, GNC))
+    oracle, gnc = row_of(table, ORACLE), row_of(table, GNC)
+    assert oracle.optimum_rate == 1.0
+    assert gnc.error_over_bound < 1.3 * oracle.error_over_bound
 
 
 def solved(error, reached=True, failure=""):
@@ -94,7 +94,7 @@ def test_table_by_hand(tmp_path):
         "schedule": "batch",
         "loss": "none",
         "wrong_ids": None,
-        "told": False,
+        "oracle": False,
         "optimum_rate": 0.0,
         "error_over_bound": 4.0,
         "median_error_over_bound": 4.0,
@@ -130,7 +130,7 @@ def test_a_solve_that_raises_is_kept_as_a_failure(monkeypatch):
 
 def test_command_writes_table_and_figure(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(
-        ablation, "VARIANTS", (OURS, GNC, Variant(wrong_ids="structured", told=True))
+        ablation, "VARIANTS", (OURS, GNC, Variant(wrong_ids="structured", oracle=True))
     )
     out = tmp_path / "a" / "b"
     command = ["ablation", "--trials", "1", "--seed", "6", "--jobs", "1", "--out", str(out)]
@@ -141,7 +141,7 @@ def test_command_writes_table_and_figure(tmp_path, capsys, monkeypatch):
     assert header[:8] == b"\x89PNG\r\n\x1a\n"
     assert min(struct.unpack(">II", header[16:])) > 500
     shown = capsys.readouterr().out
-    for printed in ("tangent then box", "gnc tls", "structured wrong ids", "told the right ids"):
+    for printed in ("tangent then box", "gnc tls", "structured wrong ids", "oracle"):
         assert printed in shown
 
 

@@ -35,8 +35,8 @@ SCORES = {
     "optimum_rate": "share at optimum",
     "inlier_precision": "inliers, precision",
     "inlier_recall": "inliers, recall",
-    "oracle_rmse_pos": "told ids: positions",
-    "oracle_rmse_landmark": "told ids: centers",
+    "oracle_rmse_pos": "oracle: positions",
+    "oracle_rmse_landmark": "oracle: centers",
     "objects_dropped": "objects left out",
 }
 EXAMPLES = 6  # maps drawn, as in the paper's figure
