@@ -1,4 +1,4 @@
-"""How well boxes fit: residuals compared with the noise model."""
+"""Residuals of boxes compared with the noise model."""
 
 from typing import TYPE_CHECKING
 
@@ -26,10 +26,11 @@ _LARGEST_CHI2, _LARGEST_SIGMA = 20.0, 5.0
 
 
 def draw_residuals(fits: BoxFits) -> "Figure":
-    """Draw histograms of whole boxes against chi-square with 4 dof, of edges against a Gaussian.
+    """Draw histograms of boxes with the density of chi-square, and of edges with a Gaussian.
 
-    Values beyond either end are in the last bin, which is hatched. Boxes that were held out from
-    the estimator have a line of their own.
+    Chi-square has 4 degrees of freedom; boxes that the image border cuts are left out. Values
+    beyond an end of the axis are in the last bin, which is hatched. Boxes that were held out from
+    the estimator have a separate line.
     """
     from scipy.stats import chi2, norm
 

@@ -38,10 +38,10 @@ def plot_results(
     max_time_difference: float | None = None,
     progress: Callable[[float], None] = lambda share: None,
 ) -> Drawn:
-    """Draw all figures that the results allow into files of a kind, "svg", "png" or "pdf".
+    """Draw all figures that the results allow, as files of a kind: "svg", "png" or "pdf".
 
     These are ``map``, ``boxes``, ``residuals``, and with a true trajectory ``position_error`` and
-    ``rotation_error``; docs/plots.md describes each. Nothing is written unless all can be drawn.
+    ``rotation_error``. docs/plots.md describes each. If one cannot be drawn, nothing is written.
 
     Parameters
     ----------
