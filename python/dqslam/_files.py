@@ -1,4 +1,4 @@
-"""Files, and directories of results: whole or not there, with errors that name file and line."""
+"""Files and directories of results, complete or absent, with errors that name file and line."""
 
 from __future__ import annotations
 

@@ -23,13 +23,13 @@ class DetectedBoxes(NamedTuple):
     class_id: NDArray[Any]
     """Shape (m,)."""
     object_id: NDArray[Any]
-    """A tracker's, -1 for none, shape (m,)."""
+    """Ids of a tracker, -1 for none, shape (m,)."""
     class_names: dict[int, str]
-    """Of every class id that occurs."""
+    """Name of each class id that occurs."""
 
 
 class _Image(NamedTuple):
-    """What is said of one image: None where nothing is."""
+    """The output of a detector for one image; parts that it does not have are None."""
 
     xyxy: object
     score: object

@@ -39,15 +39,15 @@ class Odometry:
 
     @classmethod
     def from_poses(cls, poses: ArrayLike, *, covariance: ArrayLike) -> Self:
-        """Take the steps between poses that odometry has summed up.
+        """Make odometry from the poses that it has led to.
 
         Parameters
         ----------
         poses
             world_from_robot, shape (n, 3) for [x, y, theta] or (n, 7) for [tx, ty, tz, qx, qy, qz,
-            qw]; their width tells the model.
+            qw]. The width selects the pose model.
         covariance
-            Of every step alike, shape (k, k), or of each, shape (n - 1, k, k).
+            Covariance of every step, shape (k, k), or of each step, shape (n - 1, k, k).
 
         Examples
         --------

@@ -28,7 +28,7 @@ class Truth:
     ellipsoids: Floats | None = None
     """Center and log-Cholesky shape, shape (o, 9); None when the objects are no ellipsoids."""
     box_object_id: Ints | None = None
-    """Which object each box of the recording shows, whatever its id says; shape (m,)."""
+    """True object of each box of the recording, independent of its id; shape (m,)."""
 
     def __post_init__(self) -> None:
         """Check shapes and numbers."""
