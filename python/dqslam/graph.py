@@ -1,4 +1,4 @@
-"""From a recording to the plain arrays that the core solves, and back to an estimate."""
+"""The problem of a recording as arrays for the core, and its solution as an estimate."""
 
 from dataclasses import dataclass
 

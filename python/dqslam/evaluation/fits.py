@@ -1,4 +1,4 @@
-"""How well each box fits the map, for figures of residuals and of images."""
+"""The fit of each box to the map, for figures of residuals and of images."""
 
 from __future__ import annotations
 

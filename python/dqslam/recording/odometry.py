@@ -1,4 +1,4 @@
-"""How a robot moved from pose to pose, as it measured it."""
+"""The motion of a robot from pose to pose, as it was measured."""
 
 from dataclasses import dataclass
 from typing import Self
@@ -22,8 +22,10 @@ class Odometry:
     relative: Floats
     """next_in_previous, shape (n - 1, d)."""
     covariance: Floats
-    """In the tangent at `relative`, translation [m] first, then rotation [rad],
-    both in the frame of the next pose; shape (n - 1, k, k)."""
+    """Covariance in the tangent at `relative`, shape (n - 1, k, k).
+
+    Translation [m] is first, then rotation [rad], both in the frame of the next pose.
+    """
 
     def __post_init__(self) -> None:
         """Check shapes and numbers."""
@@ -51,8 +53,8 @@ class Odometry:
 
         Examples
         --------
-        A robot drives two meters, then one more while it turns left. Each step errs by 2 cm along
-        each axis and 0.01 rad:
+        A robot drives two meters, then one more while it turns left. Each step has a sigma of 2 cm
+        along each axis and of 0.01 rad:
 
         >>> import dqslam as dq
         >>> import numpy as np
