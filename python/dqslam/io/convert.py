@@ -103,7 +103,7 @@ def convert(
         for done, kind in enumerate(kinds):
             _, name, target_name = FROM_BAG[kind]
             target = choose_format(out, target_name, FORMATS[kind], kind)
-            share = partial(_tell_part, progress, done, len(kinds))
+            share = partial(_part_progress, progress, done, len(kinds))
             more = _convert(
                 source, folder / name, kind, BAG, target, named.get(kind), context, share
             )
@@ -112,7 +112,7 @@ def convert(
     return written
 
 
-def _tell_part(progress: Progress, done: int, parts: int, share: float) -> None:
+def _part_progress(progress: Progress, done: int, parts: int, share: float) -> None:
     """Return a progress of one part that reports the share of all parts."""
     progress((done + share) / parts)
 

@@ -34,12 +34,12 @@ def draw_residuals(fits: BoxFits) -> "Figure":
     """
     from scipy.stats import chi2, norm
 
-    held_out, whole = fits.boxes.held_out, fits.is_whole
+    held_out, uncut = fits.boxes.held_out, fits.is_uncut
     with column_style():
         figure = new_figure(COLUMN_INCHES, 2.0)
         left, right = figure.subplots(1, 2)
         bins = np.linspace(0.0, _LARGEST_CHI2, 21)
-        _draw_histogram(left, fits.chi2[whole & ~held_out], fits.chi2[whole & held_out], bins)
+        _draw_histogram(left, fits.chi2[uncut & ~held_out], fits.chi2[uncut & held_out], bins)
         x = np.linspace(0.0, _LARGEST_CHI2, 200)
         left.plot(x, chi2.pdf(x, _EDGES), color="black", label="χ², 4 dof", gid="expected")
         gate = float(chi2.ppf(_GATE, _EDGES))
@@ -62,7 +62,7 @@ def draw_residuals(fits: BoxFits) -> "Figure":
         right.set(xlabel="residual of an edge [σ]", xlim=(-_LARGEST_SIGMA, _LARGEST_SIGMA))
         for axes in (left, right):
             axes.grid(alpha=0.25, linewidth=0.4)
-        _draw_legend(figure, any_held_out=bool((held_out & whole).any()))
+        _draw_legend(figure, any_held_out=bool((held_out & uncut).any()))
     return figure
 
 

@@ -86,7 +86,7 @@ def _draw_boxes(results: Results, figures: dict[str, "Figure"], left_out: dict[s
         left_out |= dict.fromkeys(("boxes", "residuals"), "no box shows an object of the map")
         return
     figures["boxes"] = draw_worst_and_median(results, fits)
-    if fits.is_whole.any():
+    if fits.is_uncut.any():
         figures["residuals"] = draw_residuals(fits)
     else:
         left_out["residuals"] = "no box of a mapped object is free of the image border"

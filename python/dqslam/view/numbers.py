@@ -43,8 +43,8 @@ def object_numbers(results: Results, evaluation: Mapping[str, Any]) -> list[Numb
     """Describe each mapped object, with its errors if ``evaluation`` has true objects."""
     objects, boxes = results.objects, results.boxes
     overlap = None if boxes is None else box_overlaps(results, boxes)
-    judged = evaluation.get("objects")
-    pairs = {pair["id"]: pair for pair in judged["pairs"]} if judged else {}
+    evaluated = evaluation.get("objects")
+    pairs = {pair["id"]: pair for pair in evaluated["pairs"]} if evaluated else {}
     described = []
     for row in range(len(objects)):
         shown = [("center", f"{_vector(objects.centers[row])} m")]
@@ -62,7 +62,9 @@ def object_numbers(results: Results, evaluation: Mapping[str, Any]) -> list[Numb
             known = overlap[mine & np.isfinite(overlap)]
             if len(known):
                 shown.append(("IoU of boxes", f"{np.median(known):.3f}"))
-        described.append((*shown, *_errors(pairs.get(int(objects.object_ids[row])), bool(judged))))
+        described.append(
+            (*shown, *_errors(pairs.get(int(objects.object_ids[row])), bool(evaluated)))
+        )
     return described
 
 
@@ -76,9 +78,9 @@ def true_object_numbers(true: TrueObjects, row: int) -> Numbers:
     return tuple(shown)
 
 
-def _errors(pair: Mapping[str, Any] | None, judged: bool) -> Numbers:
+def _errors(pair: Mapping[str, Any] | None, evaluated: bool) -> Numbers:
     if pair is None:
-        return (("truth", "no true object matches"),) if judged else ()
+        return (("truth", "no true object matches"),) if evaluated else ()
     shown = [("center error", _meters(pair["center"]))]
     if pair["true_id"] is not None:
         shown.insert(0, ("true id", str(pair["true_id"])))
