@@ -53,7 +53,7 @@ print(f"{len(recording.timestamps)} views, {len(recording.detections)} boxes, no
 # %%
 # Which boxes show the same object?
 # ---------------------------------
-# ``dq.run`` is the function behind ``dqslam run``. It finds this together with the path and the map.
+# ``dq.run`` is the function behind ``dqslam run``. It finds this, the path and the map together.
 
 result = dq.run(recording)
 estimate = result.estimate
