@@ -1,4 +1,5 @@
 import json
+import re
 import struct
 
 import numpy as np
@@ -7,11 +8,13 @@ import pytest
 from dqslam import load_scenario
 from dqslam._core import Loss, Residual, Schedule, Start
 from dqslam.cli import main
+from dqslam.plot.ablation import plot_ablation
 from dqslam.studies import ablation
 from dqslam.studies.ablation import (
     CLEAN_VARIANTS,
     ROBUST_VARIANTS,
     VARIANTS,
+    WRONG_KINDS,
     AblationTrial,
     Variant,
     VariantSolve,
@@ -126,6 +129,17 @@ def test_a_solve_that_raises_is_kept_as_a_failure(monkeypatch):
     table = run_ablation(PAPER, trials=1, seed=6, variants=(boxes, OURS))
     assert row_of(table, boxes).failures == {6: "RuntimeError: no way"}
     assert row_of(table, OURS).optimum_rate == 1.0
+
+
+def test_the_figure_names_each_loss_and_the_oracle(tmp_path):
+    losses = [Variant(loss=loss, wrong_ids=kind) for kind in WRONG_KINDS for loss in Loss]
+    oracles = [Variant(wrong_ids=kind, oracle=True) for kind in WRONG_KINDS]
+    solves = {one: solved(1.0) for one in (OURS, *oracles, *losses)}
+    plot_ablation(tabulate([AblationTrial(0, solves)]), tmp_path / "ablation.svg")
+    # matplotlib writes texts as paths, each with the text in a comment
+    drawn = re.findall("<!-- (.*) -->", (tmp_path / "ablation.svg").read_text())
+    names = ["oracle", "none", "Huber", "Cauchy", "DCS", "switchable", "GNC TLS", "GNC GM"]
+    assert [one for one in drawn if one in names] == names
 
 
 def test_command_writes_table_and_figure(tmp_path, capsys, monkeypatch):

@@ -87,10 +87,7 @@ def _draw_back_ends(axes: "Axes", table: AblationTable) -> None:
     names: list[str] = []
     for side, kind in zip((-0.12, 0.12), WRONG_KINDS, strict=True):
         rows = [row for row in table.rows if row.variant.wrong_ids == kind]
-        names = [
-            "right_graph the\nright ids" if row.variant.oracle else label(row.variant.loss.name)
-            for row in rows
-        ]
+        names = ["oracle" if row.variant.oracle else label(row.variant.loss.name) for row in rows]
         ratio = np.array([row.error_over_bound for row in rows])
         color, marker = _KIND_STYLES[kind]
         place = np.arange(len(rows)) + side
