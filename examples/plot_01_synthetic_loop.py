@@ -2,9 +2,9 @@
 A loop with known truth
 =======================
 
-A robot drives twice around a simulated room with ten objects. Its odometry drifts; a detector
-draws boxes, and knows which object each shows. From these two alone, :func:`dqslam.solve` finds
-the path and the objects.
+A robot drives twice around a simulated room with ten objects. Its odometry drifts. A detector draws
+boxes, with the id of the object in each. From odometry and boxes alone, :func:`dqslam.solve`
+estimates the path and the objects.
 """
 
 import matplotlib.pyplot as plt
@@ -15,8 +15,8 @@ import dqslam as dq
 # %%
 # What was recorded
 # -----------------
-# A scenario holds the settings of the world, a seed draws one world and one drive. The recording is
-# all that an estimator may see.
+# A scenario has the settings of the world, and a seed draws one world and one drive. The recording
+# is everything that an estimator may use.
 
 scenario = dq.load_scenario("paper").model_copy(update={"objects": "ellipsoids"})
 recording, truth = dq.simulate(scenario, seed=4)
@@ -25,8 +25,8 @@ print(f"{len(recording.timestamps)} poses, {len(recording.detections)} boxes")
 # %%
 # The estimate
 # ------------
-# A graph is the least-squares problem as plain arrays. These boxes err by one pixel, and the
-# objects are ellipsoids indeed: that is what the noise says.
+# A graph is the least-squares problem as plain arrays. The boxes have a noise of one pixel, and the
+# objects really are ellipsoids. The box noise is set accordingly.
 
 graph = dq.build_graph(recording, box_noise=dq.BoxNoise(pixels=1.0, relative=0.0))
 estimate, summary = dq.solve(graph)
@@ -34,10 +34,10 @@ print(summary)
 print(dq.evaluate(estimate, truth))
 
 # %%
-# How sure it is
-# --------------
+# The uncertainty
+# ---------------
 # Covariances are relative to the first pose, which is fixed. Those of poses are in the frame of the
-# pose itself, so they are turned into the world to be drawn.
+# pose itself. They are rotated into the world for the figure.
 
 marginals = dq.marginal_covariances(graph, estimate)
 heading = estimate.poses[:, 2]
@@ -52,7 +52,7 @@ print(f"standard deviation of the last position: {sigma[-1]:.2f} m")
 # The map from above
 # ------------------
 # From above, an ellipsoid of center c and shape S is the ellipse of the upper left block of S.
-# Small ellipses along the path hold the position with 95 %, enlarged five times.
+# Small ellipses along the path contain the position with 95 %, and are enlarged five times.
 
 
 def ellipse(center, shape, scale=1.0):
@@ -84,8 +84,8 @@ plt.show()
 # %%
 # The error along the way
 # -----------------------
-# Odometry errs more with every turn. The estimate is pulled back as soon as the second round shows
-# objects of the first, and it stays within what it says of itself.
+# The error of odometry grows with every turn. The estimate is corrected as soon as objects of the
+# first round are seen again in the second one, and its errors agree with its covariances.
 
 error = np.linalg.norm(estimate.poses[:, :2] - truth.poses[:, :2], axis=1)
 drift = np.linalg.norm(estimate.initial_poses[:, :2] - truth.poses[:, :2], axis=1)

@@ -2,9 +2,10 @@
 Planar motion leaves tilts open
 ===============================
 
-A robot that drives straight on sees all its objects at one heading. What that hides of a dual
-quadric, and why an ellipsoid with a broad size prior is found all the same: one object, four
-motions, poses known, boxes exact to a pixel. The reasoning is in :doc:`/planar_degeneracy`.
+A robot that drives straight sees its objects at one heading. This page shows which directions of a
+dual quadric the boxes then do not determine, and that an ellipsoid with a broad size prior is
+estimated all the same. There is one object, with four motions, known poses, and boxes with a noise
+of one pixel. The explanation is in :doc:`/planar_degeneracy`.
 """
 
 import matplotlib.pyplot as plt
@@ -18,8 +19,8 @@ table = run_degeneracy(trials=TRIALS, seed=0)
 # %%
 # The linear system
 # -----------------
-# The SVD start solves for the ten entries of Q*. The solution is one null vector; each further
-# singular value at the level of rounding is a direction that no box ever shows.
+# The SVD start solves for the ten entries of Q*. The solution is one null vector. Each further
+# singular value at the level of rounding is a direction that the boxes do not determine.
 
 figure, axes = plt.subplots(figsize=(8, 3.6), layout="constrained")
 colors = ["#D55E00", "#E69F00", "#56B4E9", "#0072B2"]
@@ -33,10 +34,10 @@ axes.legend(frameon=False)
 plt.show()
 
 # %%
-# What becomes of the object
-# --------------------------
-# The paper's cost on a free dual quadric, beside an ellipsoid with a size prior, each from the SVD
-# start. Above each bar is the share of answers that are ellipsoids at all.
+# The error of the object
+# -----------------------
+# The figure compares the paper's cost on a free dual quadric with an ellipsoid with a size prior,
+# both from the SVD start. Above each bar is the share of the results that are ellipsoids.
 
 figure, axes = plt.subplots(figsize=(8, 3.6), layout="constrained")
 width = 0.35

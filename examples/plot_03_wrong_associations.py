@@ -2,9 +2,8 @@
 A fifth of the ids are wrong
 ============================
 
-A wrong id makes a whole box wrong: it pulls an object, and with it the path, to where another
-object is. Least squares believes every box. A robust loss finds out which boxes do not fit, and
-says so.
+A box with a wrong id pulls an object, and with it the path, to the place of another object. Least
+squares trusts every box. A robust loss finds the boxes that do not fit, and reports them.
 """
 
 import matplotlib.pyplot as plt
@@ -12,7 +11,7 @@ import matplotlib.pyplot as plt
 import dqslam as dq
 
 # %%
-# The same drive as ever, but one box in five carries the id of another object.
+# The drive is the same as before, but one box in five has the id of another object.
 
 scenario = dq.load_scenario("paper")
 detector = scenario.detector.model_copy(update={"wrong_associations": 0.2})
@@ -21,10 +20,10 @@ is_right = recording.detections.object_id == truth.box_object_id
 print(f"{len(is_right)} boxes, {(~is_right).sum()} of them with a wrong id")
 
 # %%
-# Three ways to take them
-# -----------------------
-# Graduated non-convexity with the Geman-McClure loss starts with all boxes and slowly hardens its
-# judgment. It is what ``dqslam paper`` takes when ids are wrong.
+# Three estimates
+# ---------------
+# Graduated non-convexity with the Geman-McClure loss reduces the weights of boxes that do not fit
+# in several rounds. ``dqslam paper`` uses it if ids are wrong.
 
 graph = dq.build_graph(recording)
 estimates = {
@@ -51,9 +50,9 @@ figure.legend(
 plt.show()
 
 # %%
-# Which boxes it threw out
-# ------------------------
-# ``Estimate.inliers`` tells for each box whether it fits. Compared with what the simulator knows:
+# The rejected boxes
+# ------------------
+# ``Estimate.inliers`` has a flag for each box that fits. Compared with the truth of the simulation:
 
 fits = estimates["GNC, Geman-McClure"].inliers
 print(f"right ids among the boxes that fit: {is_right[fits].mean():.1%}")

@@ -2,10 +2,10 @@
 A real detector on a table top
 ==============================
 
-Sixty-three views of a table with eight small objects, two of which were moved by hand in between.
-The boxes are a Faster R-CNN's. The recording, a part of LM-O, is not in this repository: the
-variable DQSLAM_REALDATA names the folder that holds it. Where there is none, a simulated camera
-goes around a simulated table instead, and this page says so.
+The recording has sixty-three views of a table with eight small objects. Two of them were moved by
+hand in between. The boxes are those of a Faster R-CNN. The recording is a part of LM-O and is not
+in this repository. The variable DQSLAM_REALDATA names the folder that has it. Without that folder,
+a simulated camera goes around a simulated table instead, and the output below states this.
 """
 
 import os
@@ -26,8 +26,8 @@ is_real = segment.is_dir()
 # %%
 # The recording
 # -------------
-# The reference path is exact. To serve as odometry it is made worse, by 2 cm and 0.6 degrees a
-# step.
+# The reference path is exact. Noise of 2 cm and 0.6 degrees a step is added to it, and the result
+# serves as odometry.
 
 if is_real:
     recording, _ = dq.load_recording(
@@ -53,7 +53,7 @@ print(f"{len(recording.timestamps)} views, {len(recording.detections)} boxes, no
 # %%
 # Which boxes show the same object?
 # ---------------------------------
-# ``dq.run`` is what the command of that name calls: it finds that out along with path and map.
+# ``dq.run`` is the function behind ``dqslam run``. It finds this, the path and the map together.
 
 result = dq.run(recording)
 estimate = result.estimate
@@ -66,7 +66,7 @@ print("left out:", dict(estimate.dropped) or "none")
 # %%
 # Against the truth
 # -----------------
-# Both paths are moved onto the reference by the rotation and translation that fit best.
+# Both paths are aligned with the reference by the rotation and translation that fit best.
 
 
 def error_mm(path):
@@ -103,8 +103,8 @@ plt.show()
 # %%
 # In the image
 # ------------
-# The boxes of the view with most of them, and those of the ellipsoids as seen from where the
-# estimate puts the camera.
+# The figure has the boxes of the view with the most boxes, and the boxes of the ellipsoids
+# projected with the estimated pose of the camera.
 
 shown = result.detections.select(np.isin(result.detections.object_id, estimate.object_ids))
 view = np.bincount(shown.pose).argmax()

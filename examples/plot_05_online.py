@@ -1,10 +1,10 @@
 """
-Step by step, as it arrives
-===========================
+Step by step
+============
 
-A robot wants to know where it is now. :class:`dqslam.OnlineSlam` takes odometry and boxes as they
-come, does bounded work for each step, and has an estimate at any time. What it knew then, what it
-makes of it when a round closes, and what a polish adds at the end.
+A robot needs its present pose. :class:`dqslam.OnlineSlam` takes odometry and boxes as they arrive,
+does bounded work for each step, and has an estimate at any time. This page compares the pose after
+each step, the path at the end of the drive, and the path after a polish.
 """
 
 import matplotlib.pyplot as plt
@@ -19,7 +19,7 @@ recording, truth = dq.simulate(scenario, seed=4)
 # The loop of a robot
 # -------------------
 # ``steps_of`` replays a recording: each step has a time, the motion since the last one, and boxes.
-# The pose that is known at once is kept, to be compared with the whole path at the end.
+# The pose after each step is stored, and compared with the complete path at the end.
 
 slam = dq.OnlineSlam(recording.camera, box_noise=dq.BoxNoise(pixels=1.0, relative=0.0))
 now = []
@@ -36,8 +36,8 @@ print(f"{len(slam)} steps, {len(slam.objects.object_ids)} objects")
 
 
 # %%
-# How well it knew, and when
-# --------------------------
+# The errors over time
+# --------------------
 
 
 def error(path):
@@ -60,10 +60,10 @@ axes.legend(frameon=False, ncols=4, loc="upper center", bbox_to_anchor=(0.5, 1.1
 plt.show()
 
 # %%
-# What a step costs
-# -----------------
-# Boxes that were linearized: a few for the window of recent poses, more where objects of the first
-# round come back into view and the path behind them is moved.
+# The work of a step
+# ------------------
+# The measure is the number of linearized boxes. They are few for the window of recent poses. They
+# are more if objects of the first round are seen again and the path since then is corrected.
 
 figure, axes = plt.subplots(figsize=(8, 2.8), layout="constrained")
 axes.semilogy(recording.timestamps, np.maximum(linearized, 1), ".", color="#0072B2")

@@ -1,4 +1,4 @@
-"""Checks of arguments, and of arrays by row: what they raise says which one is wrong."""
+"""Checks of arguments and of the rows of arrays, with errors that name what is wrong."""
 
 from collections.abc import Sequence
 
@@ -11,7 +11,7 @@ Bools = NDArray[np.bool_]
 
 
 def require(value: object, kind: type, call: str, hint: str) -> None:
-    """Raise a TypeError that says what a call needs, and how one gets it."""
+    """Raise a TypeError that names the needed type and how to get it, unless the value has it."""
     if not isinstance(value, kind):
         given, wanted = _with_article(type(value).__name__), _with_article(kind.__name__)
         raise TypeError(f"{call} needs {wanted}, not {given}: {hint}")
@@ -28,7 +28,7 @@ def assign(instance: object, **values: object) -> None:
 
 
 def first_row(bad: Bools) -> int | None:
-    """Return the first row with any bad entry, None when all are good; shape (n, ...)."""
+    """Return the first row with a bad entry, or None if there is none; shape (n, ...)."""
     if not bad.any():
         return None
     return int(np.argmax(bad.reshape(len(bad), -1).any(axis=1)))

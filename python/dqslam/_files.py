@@ -1,4 +1,4 @@
-"""Files, and directories of results: whole or not there, with errors that name file and line."""
+"""Files and directories of results, complete or absent, with errors that name file and line."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pathlib import Path
 
 
 class FileError(ValueError):
-    """What is wrong in a file, as ``path:line: message`` (or ``path: message``)."""
+    """A mistake in a file, as ``path:line: message`` or ``path: message``."""
 
     def __init__(self, path: str | Path, message: str, line: int | None = None) -> None:
         super().__init__(f"{path}: {message}" if line is None else f"{path}:{line}: {message}")

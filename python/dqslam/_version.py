@@ -1,8 +1,8 @@
-"""Which version of dqslam this is."""
+"""The version of dqslam."""
 
 
 def version() -> str | None:
-    """Return the version of the installed package; None when it is not installed."""
+    """Return the version of the installed package; None if it is not installed."""
     from importlib import metadata
 
     try:

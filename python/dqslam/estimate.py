@@ -1,4 +1,4 @@
-"""What an estimator answers: plain data."""
+"""The result of an estimator, as plain data."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -12,7 +12,7 @@ from dqslam._repr import counted
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """Poses and objects as estimated, and the poses it started from.
+    """Estimated poses and objects, and the initial poses.
 
     Examples
     --------
@@ -34,19 +34,19 @@ class Estimate:
     initial_poses: Floats
     """world_from_robot by odometry alone, shape (n, d)."""
     object_ids: Ints
-    """Of the mapped objects, ascending, shape (o,)."""
+    """Ids of the mapped objects, ascending, shape (o,)."""
     class_names: tuple[str, ...]
     """One per mapped object."""
     observations: Ints
-    """Boxes per mapped object, shape (o,)."""
+    """Number of boxes of each mapped object, shape (o,)."""
     dual_quadrics: Floats
     """q1 .. q9 with Q*(4,4) = 1, shape (o, 9)."""
     ellipsoids: Floats
-    """Center and log-Cholesky shape, shape (o, 9); rows of NaN where q is no ellipsoid."""
+    """Center and log-Cholesky shape, shape (o, 9); NaN for an object that is no ellipsoid."""
     inliers: Bools = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
-    """Whether each box fits, chi-square at most `outlier_chi_square`; shape (b,)."""
+    """Whether the chi-square of each box is at most `outlier_chi_square`, shape (b,)."""
     dropped: Mapping[int, str] = field(default_factory=dict)
-    """Ids of the objects that were not mapped, and why."""
+    """Reasons why objects are not in the map, by id."""
 
     def __repr__(self) -> str:
         """Show the pose model, and how many poses and objects there are."""

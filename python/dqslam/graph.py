@@ -1,4 +1,4 @@
-"""From a recording to the plain arrays that the core solves, and back to an estimate."""
+"""The problem of a recording as arrays for the core, and its solution as an estimate."""
 
 from dataclasses import dataclass
 
@@ -22,7 +22,7 @@ ENOUGH_INLIER_SHARE = 1.0 / 3.0
 
 @dataclass(frozen=True, eq=False)
 class Graph:
-    """The problem as arrays for the core, and the names of its rows."""
+    """A problem as arrays for the core, with the ids and names of its rows."""
 
     core: _core.Graph
     timestamps: Floats
@@ -49,21 +49,22 @@ def build_graph(
     size_prior: SizePrior | SizePriors | None = None,
     scene_priors: _core.ScenePriors | None = None,
 ) -> Graph:
-    """Lay out a recording as a least-squares problem that starts from dead reckoning.
+    """Make the least-squares problem of a recording, with initial poses from dead reckoning.
 
     Parameters
     ----------
     box_noise, size_prior
-        Assumptions about boxes and objects; a table of size priors has one for each class.
+        Assumptions about boxes and objects, by default those of ``BoxNoise`` and ``SizePrior``.
+        ``SizePriors`` has a size prior for each class.
     scene_priors
-        Knowledge of the scene, by default none: whether objects are upright or stand on the
-        ground, and the height of the camera.
+        Priors on the scene, by default none: objects are upright or stand on the ground, and the
+        camera has a known height.
 
     Raises
     ------
     ValueError
-        If there are no boxes, a box has no object id, a relative position belongs to an object
-        without boxes, a size prior to a class without boxes, or the core refuses the problem.
+        If there are no boxes, if a box has no object id, if a relative position is of an object
+        without boxes or a size prior of a class without boxes, or if the core refuses the problem.
 
     Examples
     --------
@@ -121,11 +122,24 @@ def solve(
     *,
     start: _core.State | None = None,
 ) -> tuple[Estimate, _core.Summary]:
-    """Estimate poses and objects, from odometry or a given start; options default to the core's.
+    """Estimate poses and objects.
 
     The default loss is robust: boxes that do not fit their object have no weight. Objects that too
-    few of their boxes fit are not in the estimate but in `Estimate.dropped`, with the reason.
-    Objects that the landmark model left as no ellipsoid have NaN in `Estimate.ellipsoids`.
+    few of their boxes fit are in `Estimate.dropped`, with the reason, and not in the estimate. With
+    free dual quadrics, objects that are no ellipsoids have NaN in `Estimate.ellipsoids`.
+
+    Parameters
+    ----------
+    options
+        Options of the solver, by default those of ``SolveOptions()``.
+    start
+        Initial poses and objects. By default poses start at the odometry, and the solver
+        initializes the objects.
+
+    Raises
+    ------
+    ValueError
+        If an option is out of its range, or the start does not fit the problem.
 
     Examples
     --------

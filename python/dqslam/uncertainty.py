@@ -1,6 +1,6 @@
-"""The uncertainty of an estimate, and the best that is possible: covariances and their bound.
+"""Covariances of an estimate, and their bound.
 
-The gauge is the first pose: it is fixed, and everything is relative to it.
+The first pose is fixed, and everything is relative to it.
 """
 
 from dataclasses import dataclass
@@ -48,7 +48,7 @@ class Marginals:
     """One entry for each pose and object with an undetermined parameter."""
 
     def __repr__(self) -> str:
-        """Show how many poses and objects there are, and of how many nothing is known."""
+        """Show the numbers of poses and objects, and of those that are under-constrained."""
         unknown = f", {len(self.under_constrained)} under-constrained"
         return (
             f"Marginals({counted(len(self.poses), 'pose')}, {counted(len(self.objects), 'object')}"

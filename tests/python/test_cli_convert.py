@@ -162,7 +162,7 @@ def test_bad_mounts(tmp_path, text, message):
         ("none.csv out.json", "none.csv: no such file"),
         (
             "boxes.csv out.dat",
-            "out.dat: its ending tells no format of detections",
+            "out.dat: its ending is of no format of detections",
         ),
         ("boxes.csv out.json --to tum", "boxes.csv: it is of detections, which tum is not"),
         ("boxes.csv out.json --to bvh", "--to: format 'bvh' is none of rosbag, json, toml"),
@@ -172,10 +172,10 @@ def test_bad_mounts(tmp_path, text, message):
         ("boxes.csv boxes.csv", "boxes.csv: the file would be written over itself"),
         (
             "mot.txt out.csv",
-            "mot has no times: say them with --frame-times",
+            "mot has no times: give them with --frame-times",
         ),
         ("mot.txt out.csv --frame-rate 0", "frame rate is 0 Hz, not positive"),
-        ("mot.txt out.csv --frame-rate 1 --frame-times x", "both say when a frame was taken"),
+        ("mot.txt out.csv --frame-rate 1 --frame-times x", "both give the times of frames"),
         ("bad.csv out.json", "bad.csv:3: x1 is nan, not finite"),
         ("empty.csv out.json", "empty.csv: is empty"),
         ("notes.md out.json", "notes.md: is in no known format; name it with --format"),

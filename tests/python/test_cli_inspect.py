@@ -8,7 +8,7 @@ import realdata
 from console import assert_one_line_of_error
 from dqslam.cli import main
 
-TOO_FEW = "only 4 objects to tell a lens by"
+TOO_FEW = "only 4 objects to compare lenses with"
 
 
 def call(files, *more):

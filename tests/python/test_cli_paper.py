@@ -69,7 +69,7 @@ def test_the_bound_and_wrong_ids_add_to_each_row(tmp_path, capsys):
         assert 0.9 < row["inlier_precision"] <= 1.0
         assert row["volume_relative_error"]["med"] < 0.5
     shown = capsys.readouterr().out
-    for label in ("error / bound", "95 % interval", "inliers, recall", "told ids: centers"):
+    for label in ("error / bound", "95 % interval", "inliers, recall", "oracle: centers"):
         assert label in shown
 
 

@@ -135,7 +135,7 @@ def test_times_of_frames_from_a_file(tmp_path, capsys, files, images):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--frames", "3"], "--frames and --video are of --images"),
+        (["--frames", "3"], "--frames and --video need --images"),
         (["--images", "IMAGES", "--frames", "7-3"], "--frames: '7-3' is not like 7, 7-20 or"),
         (["--images", "IMAGES", "--frames", "x"], "--frames: 'x' is not like"),
         (["--images", "IMAGES", "--frames", "999"], "no image is of a pose among 999"),
@@ -144,9 +144,9 @@ def test_times_of_frames_from_a_file(tmp_path, capsys, files, images):
         (["--groundtruth", "none.txt"], "none.txt: no such file"),
         (
             ["--images", "IMAGES", "--frame-rate", "1", "--frame-times", "x.csv"],
-            "--frame-times and --frame-rate both say",
+            "--frame-times and --frame-rate both give",
         ),
-        (["--parameter", "seed"], "--parameter is of a sweep"),
+        (["--parameter", "seed"], "--parameter needs a sweep"),
     ],
 )
 def test_a_mistake_is_one_line_and_nothing_is_written(

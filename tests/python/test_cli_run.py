@@ -121,7 +121,7 @@ def test_the_covariance_of_each_step_may_be_given(files, orbit, capsys):
     assert len(rows) == count - 1
     capsys.readouterr()
     assert call(files, *given, "--odometry-noise", "translation=0.01,rotation=0.01") == 2
-    assert "--odometry-covariance: the noise is given already" in capsys.readouterr().err
+    assert "--odometry-covariance: another option gives the noise" in capsys.readouterr().err
 
 
 def test_without_truth_no_error_is_claimed(files, capsys):

@@ -52,4 +52,4 @@ def test_the_noise_is_estimated_by_default(files):  # noqa: F811
 
 def test_goes_not_with_mapping(files, capsys):  # noqa: F811
     assert call(files, "--online", "--mode", "mapping") == 2
-    assert "--online: does not go with --mode mapping" in capsys.readouterr().err
+    assert "--online: cannot be combined with --mode mapping" in capsys.readouterr().err

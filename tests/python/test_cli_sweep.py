@@ -44,7 +44,7 @@ def test_a_table_of_cells_and_each_error_once(command, tmp_path, capsys):
         assert f"wrote {out / name}" in shown.splitlines()
     assert (out / "sweep.toml").read_text() == SWEEP
     assert main([*command, "--jobs", "1"]) == 0
-    assert "0 trials run, 8 were there already" in capsys.readouterr().out
+    assert "0 trials run, 8 were finished before" in capsys.readouterr().out
 
 
 def test_the_table_says_what_the_summary_says(command, tmp_path, capsys, monkeypatch):
@@ -70,7 +70,7 @@ def test_what_was_in_force_goes_on_where_it_was(command, tmp_path, capsys):
         "jobs": 1,
     }
     assert main(["sweep", "--config", str(config)]) == 0
-    assert "0 trials run, 8 were there already" in capsys.readouterr().out
+    assert "0 trials run, 8 were finished before" in capsys.readouterr().out
 
 
 def test_json_is_the_summary_and_quiet_is_nothing(command, tmp_path, capsys):

@@ -34,7 +34,7 @@ def test_a_perfect_object_fits_and_one_that_is_not_mapped_has_nothing(results):
     assert (fits.object_row[of(fits, 13)] == -1).all()
     for table in (fits.predicted, fits.residual, fits.overlap, fits.chi2):
         assert np.isnan(table[of(fits, 13)]).all()
-    assert not fits.is_whole[of(fits, 13)].any()
+    assert not fits.is_uncut[of(fits, 13)].any()
 
 
 def test_a_shifted_object_by_brute_force(results):
@@ -74,7 +74,7 @@ def test_an_edge_that_the_image_cuts_has_no_residual(results):
     fits = fit_boxes(replace(results, boxes=replace(results.boxes, truncated=truncated)))
     np.testing.assert_array_equal(np.isnan(fits.residual[row]), [False, False, True, False])
     assert np.isnan(fits.chi2[row])
-    assert not fits.is_whole[row]
+    assert not fits.is_uncut[row]
 
 
 def test_frames_from_the_worst(results):

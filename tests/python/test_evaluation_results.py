@@ -12,9 +12,9 @@ from dqslam.assumptions import OdometryNoise
 from dqslam.estimate import Estimate
 from dqslam.evaluation import (
     common_poses,
+    evaluate_association,
+    evaluate_objects,
     evaluate_results,
-    judge_association,
-    judge_objects,
 )
 from dqslam.io import Trajectory, load_recording, read_trajectory
 from dqslam.metrics import align_positions, center_errors
@@ -132,13 +132,13 @@ def test_without_sizes_classes_and_ids(files, tmp_path):
     path.write_text("\n".join(keep) + "\n")
     truth, results = io.read_true_objects(path), io.load_results(files.results)
     motion = align_positions(results.poses[:, :3], read_trajectory(files.groundtruth)[1][:, :3])
-    found = judge_objects(results.objects, truth, motion, gate=0.03)
+    found = evaluate_objects(results.objects, truth, motion, gate=0.03)
     assert (found["by_class"], found["matched"], found["moving"]) == (False, 4, 0)
     assert found["pairs"][0]["true_id"] is None
     assert found["size_relative_median"] is None
     assert found["iou_3d_mean"] is None
     with pytest.raises(ValueError, match="objects.csv: there are no ids to match by"):
-        judge_objects(results.objects, truth, motion, match="id")
+        evaluate_objects(results.objects, truth, motion, match="id")
 
 
 def test_boxes(files):
@@ -262,7 +262,7 @@ def test_classes_as_ids_on_a_real_desk(tmp_path):
     io.save_estimate(nothing_mapped, tmp_path, detections=recording.detections)
     results = io.load_results(tmp_path)
     truth = io.read_true_boxes(boxes, results.camera, "derived_track_id")
-    found = judge_association(results, truth, min_iou=0.95)
+    found = evaluate_association(results, truth, min_iou=0.95)
     # Each track has one class, so that all its boxes are together; some classes have several.
     assert (found["recall"], found["id_switches"], found["invented"]) == (1.0, 0, 0)
     assert found["found"] + found["missed"] == 27

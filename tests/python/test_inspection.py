@@ -250,7 +250,7 @@ def test_what_cannot_be_told_is_said(tmp_path):
     inspection = inspect(camera, still, table, "track_id")
     assert inspection.unchecked == {
         "pose direction": "no reading of the poses puts the objects in front of the camera",
-        "distortion": "rays miss each other by more than the image, too much to tell a lens by",
+        "distortion": "rays miss each other by more than the image, too much to compare lenses",
     }
     few = replace(table, class_id=np.arange(len(table)))
     assert inspect(camera, trajectory, few, None).unchecked["pose direction"] == (

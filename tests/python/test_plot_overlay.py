@@ -151,7 +151,7 @@ def test_an_mp4_is_one(tmp_path, results, images):
 
 def test_without_ffmpeg_there_is_no_mp4(tmp_path, results, images, monkeypatch):
     monkeypatch.setenv("PATH", str(tmp_path))
-    with pytest.raises(io.FileError, match=r"MP4 needs ffmpeg .*\.gif does without"):
+    with pytest.raises(io.FileError, match=r"MP4 needs ffmpeg .*\.gif does not"):
         save_video(Overlay(results), images, tmp_path / "film.mp4", rate=5.0)
     with pytest.raises(io.FileError, match=r"none of .mp4, .gif"):
         save_video(Overlay(results), images, tmp_path / "film.avi", rate=5.0)

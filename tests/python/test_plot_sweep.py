@@ -93,7 +93,7 @@ def test_a_cell_without_the_metric_is_left_out():
 
 
 def test_what_was_not_varied_is_refused():
-    with pytest.raises(ValueError, match="nois was not varied; that were noise, loss"):
+    with pytest.raises(ValueError, match="nois was not varied; varied were noise, loss"):
         draw_sweep(GRID, "nois")
 
 

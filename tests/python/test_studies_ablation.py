@@ -1,4 +1,5 @@
 import json
+import re
 import struct
 
 import numpy as np
@@ -7,11 +8,13 @@ import pytest
 from dqslam import load_scenario
 from dqslam._core import Loss, Residual, Schedule, Start
 from dqslam.cli import main
+from dqslam.plot.ablation import plot_ablation
 from dqslam.studies import ablation
 from dqslam.studies.ablation import (
     CLEAN_VARIANTS,
     ROBUST_VARIANTS,
     VARIANTS,
+    WRONG_KINDS,
     AblationTrial,
     Variant,
     VariantSolve,
@@ -22,7 +25,7 @@ from dqslam.studies.ablation import (
 PAPER = load_scenario("paper")
 OURS = Variant()
 PAPERS = Variant(Residual.ALGEBRAIC, Start.IDENTITY, Schedule.BATCH)
-TOLD = Variant(wrong_ids="random", told=True)
+ORACLE = Variant(wrong_ids="random", oracle=True)
 GNC = Variant(wrong_ids="random", loss=Loss.GNC_TLS)
 
 
@@ -42,7 +45,7 @@ def test_every_part_is_tried_once():
     assert len(ROBUST_VARIANTS) == 2 * (len(Loss) + 1)
     assert OURS in CLEAN_VARIANTS
     assert {variant.loss for variant in CLEAN_VARIANTS} == {Loss.NONE}
-    assert [variant.loss for variant in ROBUST_VARIANTS if variant.told] == [Loss.NONE] * 2
+    assert [variant.loss for variant in ROBUST_VARIANTS if variant.oracle] == [Loss.NONE] * 2
 
 
 def test_only_what_is_named_differs_from_the_default():
@@ -65,10 +68,10 @@ def test_ours_reaches_the_optimum_and_the_papers_does_not(table):
 
 
 def test_a_back_end_makes_up_for_wrong_ids():
-    table = run_ablation(PAPER, trials=1, seed=6, variants=(TOLD, GNC))
-    told, gnc = row_of(table, TOLD), row_of(table, GNC)
-    assert told.optimum_rate == 1.0
-    assert gnc.error_over_bound < 1.3 * told.error_over_bound
+    table = run_ablation(PAPER, trials=1, seed=6, variants=(ORACLE, GNC))
+    oracle, gnc = row_of(table, ORACLE), row_of(table, GNC)
+    assert oracle.optimum_rate == 1.0
+    assert gnc.error_over_bound < 1.3 * oracle.error_over_bound
 
 
 def solved(error, reached=True, failure=""):
@@ -94,7 +97,7 @@ def test_table_by_hand(tmp_path):
         "schedule": "batch",
         "loss": "none",
         "wrong_ids": None,
-        "told": False,
+        "oracle": False,
         "optimum_rate": 0.0,
         "error_over_bound": 4.0,
         "median_error_over_bound": 4.0,
@@ -128,9 +131,20 @@ def test_a_solve_that_raises_is_kept_as_a_failure(monkeypatch):
     assert row_of(table, OURS).optimum_rate == 1.0
 
 
+def test_the_figure_names_each_loss_and_the_oracle(tmp_path):
+    losses = [Variant(loss=loss, wrong_ids=kind) for kind in WRONG_KINDS for loss in Loss]
+    oracles = [Variant(wrong_ids=kind, oracle=True) for kind in WRONG_KINDS]
+    solves = {one: solved(1.0) for one in (OURS, *oracles, *losses)}
+    plot_ablation(tabulate([AblationTrial(0, solves)]), tmp_path / "ablation.svg")
+    # matplotlib writes texts as paths, each with the text in a comment
+    drawn = re.findall("<!-- (.*) -->", (tmp_path / "ablation.svg").read_text())
+    names = ["oracle", "none", "Huber", "Cauchy", "DCS", "switchable", "GNC TLS", "GNC GM"]
+    assert [one for one in drawn if one in names] == names
+
+
 def test_command_writes_table_and_figure(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(
-        ablation, "VARIANTS", (OURS, GNC, Variant(wrong_ids="structured", told=True))
+        ablation, "VARIANTS", (OURS, GNC, Variant(wrong_ids="structured", oracle=True))
     )
     out = tmp_path / "a" / "b"
     command = ["ablation", "--trials", "1", "--seed", "6", "--jobs", "1", "--out", str(out)]
@@ -141,7 +155,7 @@ def test_command_writes_table_and_figure(tmp_path, capsys, monkeypatch):
     assert header[:8] == b"\x89PNG\r\n\x1a\n"
     assert min(struct.unpack(">II", header[16:])) > 500
     shown = capsys.readouterr().out
-    for printed in ("tangent then box", "gnc tls", "structured wrong ids", "told the right ids"):
+    for printed in ("tangent then box", "gnc tls", "structured wrong ids", "oracle"):
         assert printed in shown
 
 

@@ -8,12 +8,12 @@ import pytest
 from dqslam import BoxNoise, SizePrior, SolveOptions, _core, load_scenario, simulate, solve
 from dqslam.metrics import Report, evaluate
 from dqslam.studies.paper import (
-    Beliefs,
+    Assumptions,
     PaperTrial,
     ScoredSolve,
     Settings,
     Statistics,
-    beliefs,
+    assumptions_of,
     example_maps,
     method_options,
     methods,
@@ -148,10 +148,14 @@ def changed_world(**values):
 
 
 def test_the_bound_of_ellipsoids_is_that_of_an_estimator_that_knows_noise_and_sizes():
-    told = beliefs(HONEST, Settings(bound=True))
-    assert told.box_noise == BoxNoise(1.0, 0.0)
-    assert told.size_prior == SizePrior(np.log(0.25), np.log(1.22))
-    assert beliefs(HONEST, Settings()) == beliefs(PAPER, Settings(bound=True)) == Beliefs()
+    chosen = assumptions_of(HONEST, Settings(bound=True))
+    assert chosen.box_noise == BoxNoise(1.0, 0.0)
+    assert chosen.size_prior == SizePrior(np.log(0.25), np.log(1.22))
+    assert (
+        assumptions_of(HONEST, Settings())
+        == assumptions_of(PAPER, Settings(bound=True))
+        == Assumptions()
+    )
 
 
 @pytest.mark.parametrize(
@@ -164,7 +168,7 @@ def test_the_bound_of_ellipsoids_is_that_of_an_estimator_that_knows_noise_and_si
 )
 def test_true_sizes_are_those_that_are_drawn(world):
     scenario = changed_world(**world)
-    prior = beliefs(scenario, Settings(bound=True)).size_prior
+    prior = assumptions_of(scenario, Settings(bound=True)).size_prior
     truths = [simulate(scenario, seed=seed)[1] for seed in range(40)]
     axes = [_core.axes_from_ellipsoid(row)[1] for one in truths for row in one.ellipsoids]
     assert prior.log_mean == pytest.approx(np.log(axes).mean(), abs=0.06)
@@ -263,7 +267,7 @@ def test_wrong_ids_are_found():
 def test_who_is_told_the_right_ids_is_scored_on_the_same_objects():
     """All boxes are right, and the estimate has every other object."""
     recording, truth = simulate(PAPER, seed=6)
-    graph = Beliefs().graph(replace(recording, positions=None))
+    graph = Assumptions().graph(replace(recording, positions=None))
     estimate, _ = solve(graph, SolveOptions())
     half = replace(estimate, **{name: getattr(estimate, name)[::2] for name in PER_OBJECT})
     score = score_robust(graph, graph.core.boxes.object >= 0, truth, half, SolveOptions())

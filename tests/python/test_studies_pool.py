@@ -99,7 +99,7 @@ def test_processes_end_after_a_parent_that_is_killed(backend, tmp_path):
         ({"jobs": 0}, "jobs: expected 1 or more, got 0"),
         ({"backend": "magic"}, "backend: 'magic' is none of serial, processes, loky, dask, ray"),
         ({"backend": "loky", "scheduler": "tcp://x:1"}, "scheduler: backend loky has none"),
-        ({"scheduler": "tcp://x:1"}, "scheduler: backend loky has none; say dask or ray"),
+        ({"scheduler": "tcp://x:1"}, "scheduler: backend loky has none; choose dask or ray"),
         ({"backend": "ray"}, "backend: ray needs ray, missing: pip install ray"),
     ],
 )

@@ -66,10 +66,10 @@ def test_a_worker_is_killed_and_nothing_is_lost_or_counted_twice(cluster, tmp_pa
     path = tmp_path / "sweep.toml"
     path.write_text(SWEEP)
     sweep = load_sweep(path)
-    told = []
+    progress_calls = []
 
     def kill_at_the_sixth(done, trials):
-        told.append((done, trials))
+        progress_calls.append((done, trials))
         if done == 6:
             victim.kill()
 
@@ -79,7 +79,7 @@ def test_a_worker_is_killed_and_nothing_is_lost_or_counted_twice(cluster, tmp_pa
     assert victim.wait(timeout=10) == -9
     assert survivor.poll() is None
     assert (done.done, done.found, done.failures) == (TRIALS, 0, {})
-    assert told == [(count, TRIALS) for count in range(1, TRIALS + 1)]
+    assert progress_calls == [(count, TRIALS) for count in range(1, TRIALS + 1)]
     assert len(list((tmp_path / "dask" / "trials").iterdir())) == TRIALS
     run_sweep(sweep, tmp_path / "serial", backend="serial")
     for name in ("results.csv", "summary.json"):

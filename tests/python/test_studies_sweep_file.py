@@ -120,7 +120,7 @@ scenario.odometry.translation_sigma_m = 3
         "4: scenario.objects: Input should be 'cubes' or 'ellipsoids', not 'spheres'",
         "7: unknown key scenario.odometry.rotation_sigma; did you mean rotation_sigma_rad?",
         "10: estimator.max_iterations: expected values, like [1, 2]",
-        "11: scenario.detector.min_side_px: 50.0 stands twice",
+        "11: scenario.detector.min_side_px: 50.0 occurs twice",
         "11: scenario.detector.min_side_px: Input should be greater than or equal to 0, not -1.0",
         "13: scenario.detector.edge_sigma_px.high is missing",
         "13: unknown key scenario.detector.edge_sigma_px.hig; did you mean high?",

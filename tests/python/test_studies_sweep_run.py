@@ -39,14 +39,14 @@ def outputs(folder):
 
 def test_all_backends_give_the_same_bits(write, tmp_path):
     sweep = load_sweep(write(SMALL))
-    told = []
+    progress_calls = []
     here = run_sweep(
         sweep,
         tmp_path / "serial",
         backend="serial",
-        progress=lambda *step: told.append(step),
+        progress=lambda *step: progress_calls.append(step),
     )
-    assert told == [(done, 12) for done in range(1, 13)]
+    assert progress_calls == [(done, 12) for done in range(1, 13)]
     assert (here.done, here.found, here.failures) == (12, 0, {})
     expected = outputs(tmp_path / "serial")
     for backend in ("processes", "loky"):

@@ -30,9 +30,9 @@ def test_an_estimator_is_the_default_one_but_for_what_is_said():
     assert options.max_iterations == 7
     assert options.loss_scale == SolveOptions().loss_scale
     assert chosen.options(loss="none").loss == _core.Loss.NONE
-    assert chosen.believed().box_noise == BoxNoise(3.0, BoxNoise().relative)
-    assert chosen.believed().size_prior == SizePrior(math.log(0.5), 1.0)
-    assert settings().believed().size_prior == SizePrior()
+    assert chosen.assumptions().box_noise == BoxNoise(3.0, BoxNoise().relative)
+    assert chosen.assumptions().size_prior == SizePrior(math.log(0.5), 1.0)
+    assert settings().assumptions().size_prior == SizePrior()
 
 
 def test_a_file_has_a_word_for_each_option_of_the_solver():

@@ -100,7 +100,7 @@ def test_a_click_on_an_object_shows_its_numbers(page, scene):
     depth, down = ray @ forward, np.cross(forward, right)
     place = np.array([ray @ right, ray @ down]) * focal / depth
     page.mouse.click(0.5 * size["width"] + place[0], 0.5 * size["height"] + place[1])
-    page.locator("tr:has-text('turned by') >> text='10.0°'").wait_for()
+    page.locator("tr:has-text('orientation error') >> text='10.0°'").wait_for()
     assert page.get_by_role("combobox").first.input_value() == "lamp 12"
 
 

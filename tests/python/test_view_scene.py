@@ -50,12 +50,12 @@ def test_nothing_is_drawn_where_the_truth_is_unknown(files):
 
 def test_numbers_are_those_of_the_evaluation(files):
     numbers = {one.id: dict(one.numbers) for one in look(files).objects}
-    assert numbers[10]["center is off by"] == "0.02 m"
-    assert numbers[11]["size is off by"] == "10%"
+    assert numbers[10]["center error"] == "0.02 m"
+    assert numbers[11]["size error"] == "10%"
     assert numbers[11]["volume ratio"] == "1.33"
-    assert numbers[12]["turned by"] == "10.0°"
+    assert numbers[12]["orientation error"] == "10.0°"
     assert numbers[12]["true id"] == "12"
-    assert numbers[99]["truth"] == "no object like it"
+    assert numbers[99]["truth"] == "no true object matches"
     assert (numbers[10]["boxes"], numbers[11]["boxes"]) == ("20, 0 fit", "20, 15 fit")
     assert numbers[10]["size"] == "0.160 × 0.100 × 0.060 m"
 
@@ -156,7 +156,7 @@ def test_what_is_no_ellipsoid_has_a_place_only(files):
 
 def test_true_objects_alone_have_no_place(files):
     objects = read_true_objects(files.objects)
-    with pytest.raises(ValueError, match=r"objects.csv: where true objects lie"):
+    with pytest.raises(ValueError, match=r"objects.csv: true objects need a true trajectory"):
         build_scene(load_results(files.results), objects=objects)
 
 

@@ -1,5 +1,5 @@
-// How the parameters of an ellipsoid move with its semi-axes and its orientation, and the other way
-// round: what carries covariances from one description to the other.
+// Jacobians between the parameters of an ellipsoid and its semi-axes and orientation.  They convert
+// covariances from one description to the other.
 #pragma once
 
 #include "dqslam/geometry/blocks.h"
@@ -8,11 +8,11 @@ namespace dqslam {
 
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
-/// Of the logarithms of the semi-axes, descending, by the nine parameters.
+/// Jacobian of the logarithms of the semi-axes, descending, by the nine parameters.
 Eigen::Matrix<double, 3, kLandmarkSize> LogSemiAxesJacobian(const Vector9d& ellipsoid);
 
-/// Of the log-Cholesky shape by the logarithms of the semi-axes, in the order given, and by a turn
-/// about each of them [rad].  Throws std::invalid_argument as EllipsoidFromAxes does.
+/// Jacobian of the log-Cholesky shape by the logarithms of the semi-axes, in the order given, and
+/// by rotations about each of them [rad].  Throws std::invalid_argument as EllipsoidFromAxes does.
 Matrix6d ShapeFromAxesJacobian(const Eigen::Vector3d& semi_axes,
                                const Eigen::Vector4d& orientation_xyzw);
 

@@ -1,6 +1,6 @@
-// The geometry of poses and ellipsoids for tables, row by row: what Python calls.
-// All of them throw std::invalid_argument naming the table when shapes do not fit.
-// Where the result of a row is a matrix, those of all rows are stacked: (n * r, c).
+// The geometry of poses and ellipsoids for tables, row by row.  Python calls these functions.
+// All of them throw std::invalid_argument naming the table if shapes do not fit.
+// If the result of a row is a matrix (r, c), the matrices of all rows are stacked: (n * r, c).
 #pragma once
 
 #include <stdexcept>
@@ -14,7 +14,7 @@
 
 namespace dqslam {
 
-/// Throws std::invalid_argument naming the table unless it has a shape.
+/// Throws std::invalid_argument naming the table unless it has this shape.
 template <typename Table>
 void RequireShape(const std::string& name,
                   const Table& table,
@@ -38,41 +38,42 @@ RowMatrix AdjointRows(PoseModel model, const RowMatrix& a_from_b);
 RowMatrix PlusRows(PoseModel model, const RowMatrix& poses, const RowMatrix& tangents);
 /// pose (-) origin, shape (n, k).
 RowMatrix MinusRows(PoseModel model, const RowMatrix& poses, const RowMatrix& origins);
-/// The chain of relative poses behind the first, shape (n + 1, d).
+/// The first pose and the poses that n relative poses lead to, shape (n + 1, d).
 RowMatrix DeadReckonRows(PoseModel model, const Eigen::VectorXd& first, const RowMatrix& relative);
 /// SE(3) poses of the camera, shape (n, 7).
 RowMatrix WorldFromCameraRows(PoseModel model, const Camera& camera, const RowMatrix& poses);
 
-/// Box of ellipsoid i from pose i [undistorted px], shape (n, 4), and whether it is strictly in
-/// front; NaN where it is not.
+/// Box of ellipsoid i from pose i [undistorted px], shape (n, 4), and whether the ellipsoid is
+/// strictly in front.  The box is NaN if it is not.
 std::pair<RowMatrix, Mask> ProjectToBoxesRows(PoseModel model,
                                               const Camera& camera,
                                               const RowMatrix& poses,
                                               const RowMatrix& ellipsoids);
 
-/// Edges of the same boxes that the image does not show, see outline.h, shape (n, 4).
+/// The edges (n, 4) of these boxes that the outlines touch outside the image, see outline.h.
 BoolTable EdgesOutOfSightRows(PoseModel model,
                               const Camera& camera,
                               const RowMatrix& poses,
                               const RowMatrix& ellipsoids);
 
-/// What ProjectToBoxesRows returns, and Jacobians of the boxes by the tangent of the pose, then by
-/// the ellipsoid, stacked (4 n, k + 9); NaN where it is not strictly in front.
+/// The results of ProjectToBoxesRows, and the Jacobians of the boxes, stacked (4 n, k + 9): by the
+/// tangent of the pose, then by the ellipsoid.  They are NaN unless it is strictly in front.
 std::tuple<RowMatrix, Mask, RowMatrix> DifferentiateBoxesRows(PoseModel model,
                                                               const Camera& camera,
                                                               const RowMatrix& poses,
                                                               const RowMatrix& ellipsoids);
 
-/// Outline of ellipsoid i from pose i [undistorted px], see outline.h, stacked (n * points, 2); NaN
-/// where it is not strictly in front.
+/// Outline of ellipsoid i from pose i [undistorted px], see outline.h, stacked (n * points, 2).  It
+/// is NaN unless the ellipsoid is strictly in front.
 RowMatrix ProjectToOutlinesRows(PoseModel model,
                                 const Camera& camera,
                                 const RowMatrix& poses,
                                 const RowMatrix& ellipsoids,
                                 int points);
 
-/// Shapes S [m^2] of ellipsoids, and of dual quadrics of any signature, (n, 9); stacked (3 n, 3).
+/// Shapes S [m^2] of ellipsoids (n, 9), stacked (3 n, 3).
 RowMatrix EllipsoidShapeRows(const RowMatrix& ellipsoids);
+/// Shapes S [m^2] of dual quadrics (n, 9) of any signature, stacked (3 n, 3).
 RowMatrix DualQuadricShapeRows(const RowMatrix& quadrics);
 
 }  // namespace dqslam

@@ -1,4 +1,4 @@
-// Parameter blocks and the conventions that every other file relies on.
+// Parameter blocks and the conventions of all files.
 //
 //   frames      Transforms are `target_from_source`, quantities `x_in_frame`.
 //               Camera: x right, y down, z forward.  Robot: x forward, y left, z up.
@@ -20,7 +20,7 @@
 
 namespace dqslam {
 
-inline constexpr int kLandmarkSize = 9;  ///< of an ellipsoid and of a dual quadric alike
+inline constexpr int kLandmarkSize = 9;  ///< size of an ellipsoid and of a dual quadric
 inline constexpr int kBoxSize = 4;
 
 template <typename T>

@@ -1,10 +1,10 @@
-// How the errors of a box's edges move with the pose and the landmark, differentiated by hand: six
-// times faster than AutoDiff of costs/box.h and costs/tangent.h, which say what these errors are.
+// Derivatives of the errors of a box's edges by the pose and the landmark, by hand.  They are six
+// times faster than AutoDiff of costs/box.h and costs/tangent.h, which define these errors.
 //
-// With p, S the surface in the camera and n the normal of the plane behind an edge, both errors
-// move by
+// Let p, S be the surface in the camera and n the normal of the plane through an edge.  Then the
+// differential of both errors is
 //   d error = by_center n.dp + by_shape n^T dS n
-// The edge x of the exact box solves F = n^T S n - (n.p)^2 = 0 for n = e - x e_z, hence
+// The edge x of the exact box solves F = n^T S n - (n.p)^2 = 0 for n = e - x e_z.  Hence
 // dx = -dF / (2 (x D - B)) with B, D of ProjectToBox.
 #pragma once
 
@@ -15,13 +15,13 @@
 
 namespace dqslam {
 
-/// Of the four edges: one column of `normal` and one entry each.
+/// Derivatives of the errors of four edges, with a column of `normal` and an entry for each.
 struct EdgeDerivatives {
-  Eigen::Matrix<double, 3, kBoxSize> normal;  ///< n, in the camera
+  Eigen::Matrix<double, 3, kBoxSize> normal;  ///< n, in the frame of the camera
   Eigen::Vector4d by_center, by_shape;
 };
 
-/// ProjectToBox with derivatives.
+/// Does what ProjectToBox does, with derivatives.
 inline bool DifferentiateBox(const Surface<double>& in_camera,
                              const Camera& camera,
                              Eigen::Vector4d* box,
@@ -44,7 +44,7 @@ inline bool DifferentiateBox(const Surface<double>& in_camera,
   return true;
 }
 
-/// TangentDistances with derivatives.
+/// Does what TangentDistances does, with derivatives.
 inline bool DifferentiateTangents(const Surface<double>& in_camera,
                                   const Camera& camera,
                                   const Eigen::Vector4d& box,
@@ -72,7 +72,7 @@ inline bool DifferentiateTangents(const Surface<double>& in_camera,
   return true;
 }
 
-/// IgnoreBeyond with derivatives.
+/// Does what IgnoreBeyond of ellipsoid.h does, with derivatives.
 inline void IgnoreBeyond(const EdgeFlags& one_sided,
                          const double (&outward)[kBoxSize],
                          Eigen::Vector4d* error,
@@ -83,8 +83,9 @@ inline void IgnoreBeyond(const EdgeFlags& one_sided,
   }
 }
 
-/// Error of each edge of an observed box: of the exact box where `depth` is 0, of the tangents at
-/// that depth else; with derivatives where kDerivatives.  False where it is undefined.
+/// Error of each edge of an observed box.  It is that of the exact box if `depth` is 0, and else
+/// that of the tangents at this depth.  There are derivatives with kDerivatives.  Returns false if
+/// an error is undefined.
 template <bool kDerivatives>
 bool EdgeErrors(const Surface<double>& in_camera,
                 const Camera& camera,
@@ -113,13 +114,13 @@ bool EdgeErrors(const Surface<double>& in_camera,
   return true;
 }
 
-/// A pose of the robot and its camera, as the derivatives need them.
+/// A pose of the robot and of its camera, in the form that derivatives need.
 struct Station {
   template <typename Pose>
   static Station At(const double* pose, const Mount& mount) {
     return {pose, Pose::template WorldFromRobot<double>(pose), LocateCamera<Pose>(pose, mount)};
   }
-  const double* pose;  ///< parameters, which must outlive this
+  const double* pose;  ///< parameters, which must outlive the station
   Rigid<double> world_from_robot;
   CameraInWorld<double> camera;
 };
@@ -133,7 +134,7 @@ struct Unpacked<EllipsoidModel> {
   explicit Unpacked(const double* e) : surface(EllipsoidModel::Unpack(e)) {
     factor << std::exp(e[3]), 0, 0, e[6], std::exp(e[4]), 0, e[7], e[8], std::exp(e[5]);
   }
-  /// Of by_center m.c + by_shape m^T S m, by the nine parameters.
+  /// Derivative of by_center m.c + by_shape m^T S m by the nine parameters.
   Vector9d Gradient(const Eigen::Vector3d& m, double by_center, double by_shape) const {
     const Eigen::Vector3d g = 2 * by_shape * (factor.transpose() * m);
     Vector9d gradient;
@@ -145,7 +146,7 @@ struct Unpacked<EllipsoidModel> {
   Matrix3<double> factor;  ///< L
 };
 
-/// From the edges' own derivatives to those by the tangent of the pose and by the landmark.
+/// Converts the derivatives of edges to derivatives by the tangent of the pose and by the landmark.
 template <typename Pose, typename Landmark>
 void ByPoseAndLandmark(const EdgeDerivatives& edges,
                        const Station& station,

@@ -1,5 +1,5 @@
 // Pinhole camera with Brown-Conrady distortion, rigidly mounted on the robot.
-// Estimation works on undistorted boxes: they are converted once, at the door.
+// Estimation uses undistorted boxes, which are converted once, when they are read.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,7 +12,7 @@ namespace dqslam {
 struct Camera {
   double fx = 0, fy = 0, cx = 0, cy = 0;  ///< pixels
   int width = 0, height = 0;              ///< pixels
-  /// k1 k2 p1 p2 k3, as OpenCV orders them.
+  /// k1 k2 p1 p2 k3, in the order of OpenCV.
   Eigen::Matrix<double, 5, 1> distortion = Eigen::Matrix<double, 5, 1>::Zero();
   /// SE(3) pose of the camera on the robot, [tx ty tz qx qy qz qw].
   Eigen::Matrix<double, 7, 1> robot_from_camera =
@@ -24,29 +24,30 @@ struct Camera {
   }
   bool HasDistortion() const { return !distortion.isZero(0.0); }
 
-  /// Throws std::invalid_argument unless focal lengths and sizes are positive, all is finite and
-  /// the mount is a rigid transform.
+  /// Throws std::invalid_argument unless focal lengths and sizes are positive, all numbers are
+  /// finite and the mount is a rigid transform.
   void Validate() const;
 
-  /// Ideal pinhole pixels of distorted pixels, shape (n, 2); throws where the distortion cannot be
-  /// inverted.
+  /// Ideal pinhole pixels of distorted pixels, shape (n, 2).  Throws std::invalid_argument if the
+  /// distortion cannot be inverted at a pixel.
   RowMatrix UndistortPoints(const RowMatrix& distorted) const;
   /// Distorted pixels of ideal pinhole pixels, shape (n, 2).
   RowMatrix DistortPoints(const RowMatrix& undistorted) const;
-  /// Boxes, shape (n, 4): each edge is undistorted at its middle, where objects usually touch it.
+  /// Undistorted boxes, shape (n, 4).  Each edge is undistorted at its middle, where objects
+  /// usually touch it.
   RowMatrix UndistortBoxes(const RowMatrix& distorted) const;
-  /// Boxes as recorded, shape (n, 4): inverts UndistortBoxes, to a small part of a pixel.
+  /// Distorted boxes, shape (n, 4).  This inverts UndistortBoxes to a small part of a pixel.
   RowMatrix DistortBoxes(const RowMatrix& undistorted) const;
 };
 
-/// Where a camera stands: what every cost needs of a pose.
+/// Position and orientation of a camera, in the form that costs need.
 template <typename T>
 struct CameraInWorld {
   Matrix3<T> camera_from_world;  ///< rotation
   Vector3<T> position;           ///< of the camera, in the world
 };
 
-/// The mount as two matrices, ready for use in costs.
+/// The mount of the camera on the robot, in the form that costs need.
 struct Mount {
   explicit Mount(const Camera& camera) {
     const Rigid<double> robot_from_camera = Se3::WorldFromRobot(camera.robot_from_camera.data());

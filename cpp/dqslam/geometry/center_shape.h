@@ -2,8 +2,8 @@
 //
 //   center_shape  [cx, cy, cz, S00, S01, S02, S11, S12, S22]: center and shape, in the world.
 //
-// A Gaussian in them needs no transport when the object moves: EllipsoidManifold goes straight in
-// these coordinates.
+// A Gaussian in these coordinates needs no transport when the object moves, because
+// EllipsoidManifold moves along straight lines in them.
 #pragma once
 
 #include "dqslam/geometry/ellipsoid.h"
@@ -25,7 +25,7 @@ inline Surface<double> SurfaceOf(const Vector9d& center_shape) {
 Vector9d CenterShapeFromSurface(const Surface<double>& surface);
 Vector9d CenterShapeFromEllipsoid(const Vector9d& ellipsoid);
 
-/// Log-Cholesky parameters, with derivatives where T has them.  The shape is positive definite.
+/// Log-Cholesky parameters, with derivatives if T has them.  The shape must be positive definite.
 template <typename T>
 void EllipsoidFromCenterShape(const T* center_shape, T* ellipsoid) {
   using std::log, std::sqrt;
@@ -41,11 +41,11 @@ void EllipsoidFromCenterShape(const T* center_shape, T* ellipsoid) {
   ellipsoid[8] = l21;
 }
 
-/// center_shape + step, bent where the sum would not be an ellipsoid; false where rounding makes
-/// the result infinite or flat.
+/// center_shape + step, or the result of EllipsoidManifold::Plus if the sum may be no ellipsoid.
+/// Returns false if rounding makes the result infinite or flat.
 bool RetractCenterShape(const Vector9d& center_shape, const Vector9d& step, Vector9d* result);
 
-/// Information in these coordinates, from that in log-Cholesky parameters of the same object.
+/// Converts the information of an object in log-Cholesky parameters to these coordinates.
 Matrix9d InformationInCenterShape(const Vector9d& center_shape, const Matrix9d& of_ellipsoid);
 
 }  // namespace dqslam

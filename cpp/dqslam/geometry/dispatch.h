@@ -1,4 +1,4 @@
-// From enums to template arguments.
+// Converts enums to template arguments.
 #pragma once
 
 #include "dqslam/geometry/ellipsoid.h"
@@ -16,7 +16,7 @@ auto Dispatch(PoseModel pose_model, LandmarkModel landmark_model, Visit&& visit)
   return planar ? visit(Se2{}, DualQuadricModel{}) : visit(Se3{}, DualQuadricModel{});
 }
 
-/// Calls visit(Pose{}).
+/// Calls visit(Pose{}) with the type that the enum names.
 template <typename Visit>
 auto Dispatch(PoseModel pose_model, Visit&& visit) {
   return pose_model == PoseModel::kSe2 ? visit(Se2{}) : visit(Se3{});

@@ -3,9 +3,9 @@
 //   Q* = [ c c^T - S   c ]     c center, S shape [m^2]; an ellipsoid when S is positive definite.
 //        [   c^T       1 ]     [S&M17] eq. (2)
 //
-// Both models unpack to (c, S), so that all geometry below is written once:
+// Both models unpack to (c, S), and all geometry below is written for (c, S):
 //   EllipsoidModel    S = L L^T by construction (log-Cholesky)
-//   DualQuadricModel  S = c c^T - Q*_33, of any signature, as the paper optimizes it
+//   DualQuadricModel  S = c c^T - Q*_33, of any signature, as in the paper
 #pragma once
 
 #include <Eigen/Core>
@@ -18,7 +18,7 @@ namespace dqslam {
 
 enum class LandmarkModel { kDualQuadric, kEllipsoid };
 
-/// A quadric surface by center and shape, in whatever frame the name of the variable says.
+/// A quadric surface by center and shape, in the frame that the name of the variable has.
 template <typename T>
 struct Surface {
   Vector3<T> center;
@@ -60,7 +60,7 @@ struct DualQuadricModel {
   }
 };
 
-/// The surface seen from a camera.
+/// The surface in the frame of a camera.
 template <typename T>
 Surface<T> ToCamera(const CameraInWorld<T>& camera, const Surface<T>& in_world) {
   Surface<T> in_camera;
@@ -70,15 +70,15 @@ Surface<T> ToCamera(const CameraInWorld<T>& camera, const Surface<T>& in_world) 
   return in_camera;
 }
 
-/// The one visibility predicate: every point of the ellipsoid has positive depth.  It covers
-/// behind, around and across the camera at once.
+/// Whether every point of the ellipsoid has positive depth.  This excludes ellipsoids behind the
+/// camera, around it and across its plane.
 template <typename T>
 bool StrictlyInFront(const Surface<T>& in_camera) {
   const T& depth = in_camera.center.z();
   return depth > T(0) && depth * depth > in_camera.shape(2, 2);
 }
 
-/// Exact bounding box of the outline in the image [px]; false unless strictly in front.
+/// Exact bounding box of the outline in the image [px].  Returns false unless strictly in front.
 ///   x = (B -+ sqrt(B^2 - A D)) / D,  A = S_xx - p_x^2, B = S_xz - p_x p_z, D = S_zz - p_z^2 < 0
 template <typename T>
 bool ProjectToBox(const Surface<T>& in_camera, const Camera& camera, Vector4<T>* box) {
@@ -101,10 +101,10 @@ bool ProjectToBox(const Surface<T>& in_camera, const Camera& camera, Vector4<T>*
   return true;
 }
 
-/// Outward distance of the surface to the plane behind each edge of a box, turned into pixels at
-/// the given depth: focal (n.p + |L^T n|) / depth with n = (+-1, 0, -+x) or (0, +-1, -+y).
-/// Negative where the object ends inside the box, zero at tangency, positive where it sticks out.
-/// False where n^T S n is not positive.
+/// Outward distance of the surface from the plane through each edge of a box, converted to pixels
+/// at the given depth: focal (n.p + |L^T n|) / depth with n = (+-1, 0, -+x) or (0, +-1, -+y).  It
+/// is negative if the object ends inside the box, zero at tangency, and positive if the object
+/// extends beyond the edge.  Returns false if n^T S n is not positive.
 template <typename T>
 bool TangentDistances(const Surface<T>& in_camera,
                       const Camera& camera,
@@ -126,12 +126,12 @@ bool TangentDistances(const Surface<T>& in_camera,
   return true;
 }
 
-/// The depth for TangentDistances [m]: that of the center, but never closer than the object is
-/// thick, so that an object behind the camera still has a scale.
+/// The depth for TangentDistances [m].  It is that of the center, but at least 1.5 times the
+/// object's extent in depth from its center, so that an object behind the camera still has a scale.
 double TangentDepth(const Surface<double>& in_camera);
 
-/// Where the outline touches its bounding box at each edge [px], (u, v) one a row: the pole of the
-/// edge's line.  The box is that of ProjectToBox.
+/// The point at which the outline touches each edge of its bounding box [px], one (u, v) per row.
+/// It is the pole of the edge's line.  The box is that of ProjectToBox.
 Eigen::Matrix<double, 4, 2> TouchingPoints(const Surface<double>& in_camera,
                                            const Camera& camera,
                                            const Eigen::Vector4d& box);
@@ -144,18 +144,18 @@ EdgeFlags OneSidedEdges(const EdgeFlags& truncated,
                         const Surface<double>& in_camera,
                         const Eigen::Vector4d& predicted);
 
-/// Signs that turn errors outwards, edge by edge: of predicted - observed boxes, and of the
-/// distances of TangentDistances.
+/// The signs that make errors positive outwards, by edge: for predicted - observed boxes, and for
+/// the distances of TangentDistances.
 inline constexpr double kBoxOutward[] = {-1, -1, 1, 1}, kTangentOutward[] = {1, 1, 1, 1};
 
-/// An edge that the image border cut says only that the object goes on beyond: its error counts
-/// where the prediction ends inside.
+/// Whether an error does not count because the edge is one-sided.  Such an edge only shows that the
+/// object reaches at least to it, so its error counts only if the prediction ends inside.
 template <typename T>
 bool IsBeyond(bool one_sided, double outward, const T& error) {
   return one_sided && T(outward) * error > T(0);
 }
 
-/// Makes the errors zero that do not count.
+/// Sets errors to zero that do not count.
 template <typename T>
 void IgnoreBeyond(const EdgeFlags& one_sided,
                   Vector4<T>* error,
@@ -168,11 +168,12 @@ void IgnoreBeyond(const EdgeFlags& one_sided,
 /// Dual quadric [q1 .. q9] of a surface in the same frame.
 Vector9d DualQuadricFromSurface(const Surface<double>& surface);
 
-/// Log-Cholesky parameters of a surface; throws std::invalid_argument when it is no ellipsoid.
+/// Log-Cholesky parameters of a surface.  Throws std::invalid_argument if it is no ellipsoid.
 Vector9d EllipsoidFromSurface(const Surface<double>& surface);
 
-/// Exact conversions; the second throws std::invalid_argument when q is no ellipsoid.
+/// Dual quadric of an ellipsoid.  The conversion is exact.
 Vector9d DualQuadricFromEllipsoid(const Vector9d& ellipsoid);
+/// Ellipsoid of a dual quadric.  Throws std::invalid_argument if the quadric is no ellipsoid.
 Vector9d EllipsoidFromDualQuadric(const Vector9d& quadric);
 
 /// The 4 x 4 matrix Q* of q.  [S&M17] eq. (2)
@@ -190,7 +191,7 @@ Vector9d EllipsoidFromAxes(const Eigen::Vector3d& center,
                            const Eigen::Vector4d& orientation_xyzw);
 EllipsoidAxes AxesFromEllipsoid(const Vector9d& ellipsoid);
 
-/// Sphere of the given radius [m] as an ellipsoid.
+/// A sphere of the given radius [m] as an ellipsoid.
 Vector9d Sphere(const Eigen::Vector3d& center, double radius);
 
 }  // namespace dqslam

@@ -1,5 +1,5 @@
-// AutoDiff with respect to tangents, for every cost that has no derivatives by hand: the same
-// functors that Ceres differentiates, on jets that move along the tangents of their poses.
+// AutoDiff with respect to tangents, for every cost that has no derivatives by hand.  It uses the
+// same functors as Ceres, with jets that move along the tangents of their poses.
 #pragma once
 
 #include <ceres/jet.h>
@@ -12,14 +12,14 @@
 
 namespace dqslam {
 
-/// The parameters of a pose; as jets they move along its tangent.
+/// The parameters of a pose.  Its jets move along its tangent.
 template <typename Pose>
 struct PoseParameters {
   static constexpr int kSize = Pose::kSize;
   static constexpr int kTangentSize = Pose::kTangentSize;
   const double* values;
 
-  /// Derivative columns from `column` on are those of the tangent.
+  /// The derivative columns of the tangent begin at `column`.
   template <typename Jet>
   std::array<Jet, kSize> Jets(int column) const {
     std::array<Jet, kSize> origin, moved;
@@ -45,8 +45,8 @@ struct ObjectParameters {
   }
 };
 
-/// Residual of a cost and its Jacobian by the tangents of its blocks, side by side in their order;
-/// false where the cost fails.
+/// Residual of a cost, and its Jacobian by the tangents of its blocks, side by side in their order.
+/// Returns false if the cost fails.
 template <typename Cost, int kColumns, typename... Parameters>
 bool Differentiate(const Cost& cost,
                    Eigen::Matrix<double, Cost::kResidualSize, 1>* residual,
@@ -60,7 +60,7 @@ bool Differentiate(const Cost& cost,
     column += block.kTangentSize;
     return block.template Jets<Jet>(first);
   };
-  // Braces: the blocks are taken in their order.
+  // Braces evaluate the blocks in their order.
   const std::tuple<std::array<Jet, Parameters::kSize>...> parameters{jets_of(blocks)...};
   std::array<Jet, Cost::kResidualSize> jets;
   const bool defined = std::apply(

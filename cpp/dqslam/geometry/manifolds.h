@@ -1,10 +1,10 @@
-// Ceres manifolds: how a step moves a pose and an ellipsoid.
+// Ceres manifolds, which define how a step moves a pose and an ellipsoid.
 //
-//   pose       Plus and Minus of pose.h, tangent in the frame of the pose.
+//   pose       Plus and Minus of pose.h, with the tangent in the frame of the pose.
 //   ellipsoid  The tangent is that of its nine parameters, but the shape moves in a straight line,
-//              S + dS, rather than the factor.  A tilt l20 that the boxes hardly determine would
-//              otherwise enter S_zz, and with it the height of all boxes, as l20^2: the valley that
-//              results bends within millimeters and stops every minimizer.
+//              S + dS, instead of the factor.  If the factor moved straight, a tilt l20 that the
+//              boxes hardly determine would enter S_zz, and with it the height of all boxes, as
+//              l20^2.  The resulting valley bends within millimeters and stops every minimizer.
 #pragma once
 
 #include <ceres/autodiff_manifold.h>

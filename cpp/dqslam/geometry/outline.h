@@ -1,4 +1,4 @@
-// The outline of an ellipsoid in the image, and how much of it the image shows.
+// The outline of an ellipsoid in the image, and the edges of its box that lie outside of the image.
 #pragma once
 
 #include "dqslam/geometry/blocks.h"
@@ -7,19 +7,19 @@
 
 namespace dqslam {
 
-/// By default an outline 600 px across is off by 0.1 px at most between two of its points.
+/// The default number of points.  Chords of an outline 600 px wide are then off by 0.1 px at most.
 inline constexpr int kOutlinePoints = 128;
 
-/// Points of the outline [undistorted px], (points, 2), the last one the first again; false unless
-/// the ellipsoid is strictly in front.  The image of the dual quadric is the dual conic p p^T - S,
-/// that of an ellipse.
+/// Points of the outline [undistorted px], shape (points, 2).  The last point is the first one
+/// again.  Returns false unless the ellipsoid is strictly in front.  The image of the dual quadric
+/// is the dual conic p p^T - S, which is that of an ellipse.
 bool ProjectToOutline(const Surface<double>& in_camera,
                       const Camera& camera,
                       int points,
                       RowMatrix* outline);
 
-/// Edges of an ellipsoid's box that its outline touches outside the image, where no detector sees
-/// it.  The box is that of ProjectToBox.
+/// The edges of an ellipsoid's box that its outline touches outside the image, where no detector
+/// can see it.  The box is that of ProjectToBox.
 EdgeFlags EdgesOutOfSight(const Surface<double>& in_camera,
                           const Camera& camera,
                           const Eigen::Vector4d& box);

@@ -1,5 +1,5 @@
-// Pose models SE(2) and SE(3): the same static functions for both, so that costs and manifolds are
-// templates over the model and written once.  Storage and tangent as in blocks.h.
+// The pose models SE(2) and SE(3).  Both have the same static functions, so costs and manifolds are
+// templates over the model.  blocks.h defines storage and tangent.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -33,7 +33,7 @@ Eigen::Quaternion<T> ExpRotation(const Vector3<T>& rotation_vector) {
   return Eigen::Quaternion<T>(cos(angle * T(0.5)), axis.x(), axis.y(), axis.z());
 }
 
-/// Rotation vector [rad], of norm at most pi, of a unit quaternion.
+/// Rotation vector [rad] of a unit quaternion.  Its norm is at most pi.
 template <typename T>
 Vector3<T> LogRotation(const Eigen::Quaternion<T>& q) {
   using std::atan2, std::sqrt;
@@ -85,7 +85,7 @@ struct Se2 {
     b_from_c[2] = angle;
   }
 
-  /// Tangent of a relative pose; the angle is wrapped into [-pi, pi].
+  /// Tangent of a relative pose.  The angle is wrapped into [-pi, pi].
   template <typename T>
   static void ToTangent(const T* relative, T* tangent) {
     using std::floor;
@@ -100,7 +100,7 @@ struct Se2 {
     for (int i = 0; i < 3; ++i) relative[i] = tangent[i];
   }
 
-  /// Undoes what rounding does to a pose that is composed again and again: nothing in SE(2).
+  /// Removes the rounding errors of repeated composition.  In SE(2) there is nothing to do.
   static void Normalize(double*) {}
 };
 
@@ -142,7 +142,7 @@ struct Se3 {
     Write<T>(Translation(tangent), ExpRotation<T>(Translation(tangent + 3)), relative);
   }
 
-  /// Undoes what rounding does to the quaternion of a pose that is composed again and again.
+  /// Removes the rounding errors of repeated composition from the quaternion.
   static void Normalize(double* pose) { Eigen::Map<Eigen::Vector4d>(pose + 3).normalize(); }
 
  private:
@@ -169,7 +169,7 @@ void Plus(const T* pose, const T* tangent, T* result) {
   Pose::Compose(pose, relative, result);
 }
 
-/// pose (-) origin: the tangent with origin (+) tangent = pose.
+/// pose (-) origin, the tangent with origin (+) tangent = pose.
 template <typename Pose, typename T>
 void Minus(const T* pose, const T* origin, T* tangent) {
   T relative[Pose::kSize];
@@ -177,8 +177,8 @@ void Minus(const T* pose, const T* origin, T* tangent) {
   Pose::ToTangent(relative, tangent);
 }
 
-/// A with `a_from_b o Exp(x) = Exp(A x) o a_from_b`: turns a small motion in the frame of b into
-/// the same motion in the frame of a.
+/// The matrix A with `a_from_b o Exp(x) = Exp(A x) o a_from_b`.  It converts a small motion in the
+/// frame of b to the same motion in the frame of a.
 template <typename Pose>
 Eigen::Matrix<double, Pose::kTangentSize, Pose::kTangentSize> Adjoint(const double* a_from_b) {
   const Rigid<double> rigid = Pose::template WorldFromRobot<double>(a_from_b);

@@ -1,4 +1,4 @@
-// A step as a history keeps it, once it is known to be right.
+// Checks the input of a session and converts it to the form of a history.
 #pragma once
 
 #include <vector>
@@ -8,11 +8,12 @@
 
 namespace dqslam::online {
 
-/// As rows of a history, for a pose and a number of objects that there are.  Throws
-/// std::invalid_argument naming the table and the row for what is wrong.
+/// Observations from a pose as rows of a history that has a number of objects.  Throws
+/// std::invalid_argument naming the table and the row that are wrong.
 std::vector<Observation> CheckedObservations(const StepObservations& given, int pose, int objects);
 
-/// Odometry; of a first pose that is known there is no covariance.  Throws std::invalid_argument.
+/// Odometry as a step of a history.  A first pose that is known has no covariance.  Throws
+/// std::invalid_argument.
 template <typename Pose>
 typename History<Pose>::Step CheckedStep(const Eigen::VectorXd& relative,
                                          const RowMatrix& covariance,

@@ -1,4 +1,4 @@
-// Where a minimization begins again, and what it goes back to if that was in vain.
+// A saved state, to which a failed attempt returns.
 #pragma once
 
 #include <algorithm>
@@ -8,7 +8,7 @@
 
 namespace dqslam::online {
 
-/// Poses from `begin` on, and all objects, as they were.
+/// The poses from `begin` on and all objects, at the time of construction.
 template <typename Pose>
 class Checkpoint {
  public:

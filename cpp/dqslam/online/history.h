@@ -1,4 +1,4 @@
-// All that a session was given, and where it stands: tables that only grow at their ends.
+// All input of a session and its estimate, as tables that only grow at their ends.
 #pragma once
 
 #include <algorithm>
@@ -11,14 +11,14 @@
 
 namespace dqslam::online {
 
-/// What all residuals share.
+/// The data that all residuals share.
 struct Model {
   Model(const Camera& camera, const ScenePriors& scene, double loss_scale)
       : camera(camera), mount(camera), scene(scene), loss_scale(loss_scale) {}
   Camera camera;
   Mount mount;
   ScenePriors scene;
-  double loss_scale;  ///< of the Cauchy loss, sigmas of a whole box; 0 for least squares
+  double loss_scale;  ///< of the Cauchy loss, in sigmas of a box; 0 for least squares
 };
 
 /// A box of an object, or another measurement of it.
@@ -26,9 +26,9 @@ struct Observation {
   static constexpr int kBox = -1;
 
   int pose;
-  int object;                        ///< -1 for a box that waits: it takes no part
-  int kind = kBox;                   ///< else one of costs/measurements.h, of m numbers
-  Eigen::Vector4d value;             ///< box [px], or what was measured, and zeros
+  int object;                        ///< -1 for a box that waits, which is not used
+  int kind = kBox;                   ///< or a kind of costs/measurements.h, with m numbers
+  Eigen::Vector4d value;             ///< box [px], or the measured numbers and zeros
   Eigen::Matrix4d sqrt_information;  ///< whitens the error; zero beyond m rows and columns
   EdgeFlags truncated = EdgeFlags::Constant(false);
 
@@ -46,7 +46,7 @@ struct Observation {
   }
 };
 
-/// A Gaussian in center and shape: cost + g.d + d.H d / 2 at a distance d from `origin`.
+/// A Gaussian in center and shape.  Its cost is cost + g.d + d.H d / 2 at `origin` + d.
 struct GaussianPrior {
   Vector9d origin = Vector9d::Zero();
   Matrix9d H = Matrix9d::Zero();
@@ -63,15 +63,15 @@ struct GaussianPrior {
 };
 
 struct Object {
-  Vector9d center_shape = Vector9d::Zero();  ///< zero until it has a place
+  Vector9d center_shape = Vector9d::Zero();  ///< zero until the object is initialized
   SizePrior size;
-  GaussianPrior map;              ///< of a map that was loaded; H = 0 without
+  GaussianPrior map;              ///< prior of a loaded map; H = 0 without one
   std::vector<int> observations;  ///< rows, ascending
-  // What observations say from poses that lie before the window, poses held fixed.
+  // The observations from poses before the window, with these poses constant.
   GaussianPrior marginal;
-  int marginalized = 0;  ///< how many of `observations` are in it
-  int relinearized = 0;  ///< how many of them there were when all were linearized last
-  bool is_stale = true;  ///< poses or labels have changed since: all are to be linearized anew
+  int marginalized = 0;  ///< number of `observations` in `marginal`
+  int relinearized = 0;  ///< this number when all were linearized last
+  bool is_stale = true;  ///< whether changes of poses or labels require linearizing all again
 
   bool IsOfMap() const { return !map.H.isZero(0); }
 };
@@ -82,7 +82,7 @@ struct History {
   using Square = Eigen::Matrix<double, Pose::kTangentSize, Pose::kTangentSize>;
 
   struct Step {
-    Storage relative;  ///< to this pose from the one before
+    Storage relative;  ///< this pose relative to the one before
     Square covariance;
     Square sqrt_information;
     int first_observation;  ///< row of the first observation from this pose
@@ -92,7 +92,7 @@ struct History {
 
   Model model;
   std::vector<Storage> poses;
-  std::vector<Step> steps;  ///< one a pose; of the first pose, its prior
+  std::vector<Step> steps;  ///< one per pose; that of the first pose is its prior
   std::vector<Observation> observations;
   std::vector<Object> objects;
   bool first_pose_is_known = true;
@@ -105,7 +105,7 @@ struct History {
     return pose < num_poses() ? steps[pose].first_observation : num_observations();
   }
 
-  /// Rows of the objects that are seen from the poses from `begin` on, each once.
+  /// Rows of the objects that are observed from poses from `begin` on, each once.
   std::vector<int> ObjectsSeenFrom(int begin) const {
     std::vector<int> rows;
     std::vector<bool> is_listed(objects.size(), false);
@@ -118,7 +118,7 @@ struct History {
     return rows;
   }
 
-  /// What the derivatives of an observation need of a pose.
+  /// A pose in the form that derivatives of observations need.
   Station StationAt(int pose) const { return Station::At<Pose>(poses[pose].data(), model.mount); }
 
   static Storage Compose(const Storage& from, const Storage& relative) {
@@ -135,27 +135,27 @@ struct History {
     return Compose(from, relative);
   }
 
-  /// Puts poses from `begin` on where their odometry leads from the pose before.
+  /// Sets the poses from `begin` on to their odometry, starting at the pose before.
   void DeadReckon(int begin) {
     for (int pose = std::max(begin, 1); pose < num_poses(); ++pose)
       poses[pose] = Compose(poses[pose - 1], steps[pose].relative);
   }
 
-  /// Brings up to date what an object keeps of its observations before the pose `begin`: new ones
-  /// are added, and all are linearized anew where the object is stale or they have grown by a
-  /// quarter.  Returns how many were linearized.  In marginal_prior.cc.
+  /// Updates the marginal prior of an object to its observations before the pose `begin`.  New
+  /// observations are added.  All are linearized again if the object is stale or their number has
+  /// grown by a quarter.  Returns the number of linearized observations.  In marginal_prior.cc.
   int UpdateMarginalPrior(int begin, Object* object) const;
 
-  /// Takes over what was estimated elsewhere of the first poses and objects, log-Cholesky; later
-  /// ones move rigidly with the last of these poses.  Throws std::invalid_argument, and then
-  /// nothing has changed.  In merge.cc.
+  /// Replaces the first poses and objects by estimates of another solver; ellipsoids are
+  /// log-Cholesky.  Later poses and objects move rigidly with the last of these poses.  Throws
+  /// std::invalid_argument, and then nothing has changed.  In merge.cc.
   void Merge(const RowMatrix& estimated_poses, const RowMatrix& ellipsoids);
 
-  /// A problem for Solve().  Objects without a box take no part: `rows` has the row here of each
-  /// that does.  In to_graph.cc.
+  /// The history as a problem for Solve(), without objects that have no box.  `rows` has the row in
+  /// the history of each object of the problem.  In to_graph.cc.
   Graph ToGraph(std::vector<int>* rows) const;
 
-  /// How many boxes show each object.
+  /// The number of boxes that show each object.
   IndexVector BoxCounts() const {
     IndexVector counts = IndexVector::Zero(num_objects());
     for (const Observation& one : observations) {

@@ -1,4 +1,4 @@
-// Where an object starts, and how it settles while the poses are held fixed.
+// Initialization and refinement of an object while the poses are constant.
 #pragma once
 
 #include <vector>
@@ -7,24 +7,26 @@
 
 namespace dqslam::online {
 
-/// All observations of an object, from poses that are held fixed: least squares in its center and
-/// shape.  History and object must outlive it.
+/// The least-squares problem of an object's center and shape, with all its observations and
+/// constant poses.  History and object must outlive it.
 template <typename Pose>
 class ObjectProblem {
  public:
   ObjectProblem(const History<Pose>& history, const Object& object);
 
-  /// From the first observation: at the depth that the prior size implies, or where it was
-  /// measured.
+  /// Starts the object from its first observation: at the depth that the prior size implies, or at
+  /// the measured place.
   Vector9d Initialize() const;
 
-  /// From all boxes: the sphere of the prior size, or the one that fits their tangents best.
+  /// Starts the object from all boxes: a sphere of the prior size, or the sphere that fits their
+  /// tangents best.
   Vector9d Reinitialize(bool by_size) const;
 
-  /// Takes a few Levenberg-Marquardt steps; returns the cost.
+  /// Takes a few Levenberg-Marquardt steps and returns the cost.
   double Refine(Vector9d* center_shape);
 
-  /// The place that fits best, refined from where the object is and from both new starts.
+  /// Refines the object from its present state and from both new starts, and returns the best
+  /// result.
   Vector9d ReinitializeIfBetter();
 
   Matrix9d InformationAt(const Vector9d& center_shape);
@@ -36,8 +38,8 @@ class ObjectProblem {
   const Model& model_;
   const Object& object_;
   std::vector<const Observation*> observations_;
-  std::vector<Station> stations_;  ///< where each was made
-  std::vector<double> depths_;     ///< of the residuals linearized last, 0 for those of boxes
+  std::vector<Station> stations_;  ///< station of each observation
+  std::vector<double> depths_;     ///< of the residuals linearized last; 0 for box residuals
 };
 
 }  // namespace dqslam::online

@@ -6,11 +6,11 @@
 
 namespace dqslam::online {
 
-/// Takes at most so many steps in n unknowns, with Marquardt's damping, and stops after one that
-/// lowers the cost by less than `tolerance` of it.  Returns the cost.
-///   double linearize(state, H, g)         the cost, with J^T J and J^T r
-///   bool retract(state, step, result)     false where a step leads nowhere
-///   double cost_at(state)                 of the residuals that linearize() used last
+/// Takes at most `iterations` steps in n unknowns, with Marquardt's damping, and stops after a step
+/// that lowers the cost by less than `tolerance` of it.  Returns the cost.
+///   double linearize(state, H, g)         returns the cost, and sets J^T J and J^T r
+///   bool retract(state, step, result)     returns false if the step is impossible
+///   double cost_at(state)                 the cost with the residuals that linearize() used last
 template <int n, typename State, typename Linearize, typename Retract, typename CostAt>
 double LevenbergMarquardt(int iterations,
                           double tolerance,

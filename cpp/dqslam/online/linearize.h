@@ -1,8 +1,8 @@
 // Residuals and their derivatives by the tangent of the pose and the center_shape of the object.
 //
-// Those of a box's edges are in box_derivatives.h; here they go on to the center_shape, by which
-// the derivative of n^T S n is the products of n's entries.  Where the object is not strictly in
-// front, the tangent residual takes the place of the box's, see costs/tangent.h.
+// Derivatives of a box's edges are in box_derivatives.h.  Here they are converted to derivatives by
+// center_shape; the derivative of n^T S n by it is the products of n's entries.  If the object is
+// not strictly in front, the tangent residual replaces the box residual, see costs/tangent.h.
 #pragma once
 
 #include "dqslam/online/history.h"
@@ -15,13 +15,13 @@ struct LinearizedObservation {
   Eigen::Matrix<double, 4, Pose::kTangentSize> by_pose;
   Eigen::Matrix<double, 4, 9> by_object;
   double chi_square;  ///< before the loss
-  double cost;        ///< after the loss, which scales the rest
-  double depth;       ///< of the tangent residual [m], 0 where it is the box's
+  double cost;        ///< after the loss, which also scales residual and derivatives
+  double depth;       ///< of the tangent residual [m]; 0 for the box residual
 };
 
-/// Cost of an observation after the loss, and its chi-square before; with the residual that
-/// Linearize() used, of that depth.  Infinite where it is the box's and the object is not strictly
-/// in front.
+/// Cost of an observation after the loss, and its chi-square before the loss.  `depth` selects the
+/// residual that Linearize() used.  The cost is infinite for a box residual of an object that is
+/// not strictly in front.
 template <typename Pose>
 double CostOfObservation(const Model& model,
                          const Station& station,
@@ -30,14 +30,14 @@ double CostOfObservation(const Model& model,
                          double depth,
                          double* chi_square);
 
-/// What an observation costs beside its tangent residual where its object is not in front: such a
-/// place is worth little, however well the tangents fit there.
+/// Cost added to an observation whose object is not in front.  Such a state is bad even if the
+/// tangents fit well.
 inline constexpr double kUndefinedCost = 50;
 
-/// Which residual a box has where its object is in front; elsewhere it is the tangent's.
+/// The residual of a box whose object is in front.  Other boxes always have the tangent residual.
 enum class EdgeResidual { kBox, kTangent };
 
-/// The residual with derivatives.
+/// Computes the residual with derivatives.
 template <typename Pose>
 void Linearize(const Model& model,
                const Station& station,
@@ -46,7 +46,7 @@ void Linearize(const Model& model,
                EdgeResidual edges,
                LinearizedObservation<Pose>* linear);
 
-/// Residual and derivatives by the tangents of both poses, (k, 2 k).
+/// Residual of a step and its derivatives by the tangents of both poses.
 template <typename Pose>
 struct LinearizedStep {
   static constexpr int k = Pose::kTangentSize;
@@ -63,14 +63,15 @@ LinearizedStep<Pose> LinearizeStep(const typename History<Pose>::Step& step,
 template <typename Pose>
 double CostOfStep(const typename History<Pose>::Step& step, const double* from, const double* to);
 
-/// Adds the priors of an object to H and g and returns their cost; infinite where they fail.
+/// Adds the priors of an object to H and g and returns their cost, which is infinite if they fail.
 double AddPriors(const Model& model,
                  const Object& object,
                  const Vector9d& center_shape,
                  GaussianPrior* sum);
 double CostOfPriors(const Model& model, const Object& object, const Vector9d& center_shape);
 
-/// Derivatives by a pose of the camera's known height: J (k), residual; cost 0 where it is unknown.
+/// Derivatives of the residual of the camera's known height by a pose.  Returns the residual, which
+/// is 0 if the height is unknown.
 template <typename Pose>
 double LinearizeHeight(const Model& model,
                        const double* pose,

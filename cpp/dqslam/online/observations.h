@@ -1,4 +1,4 @@
-// What a caller gives a session: what a pose saw, and later which objects its boxes show.
+// The input of a session: observations from a pose, and later changes of their objects.
 #pragma once
 
 #include <vector>
@@ -7,24 +7,24 @@
 
 namespace dqslam::online {
 
-/// What one pose saw.  Objects are rows; those from the number of objects on are new, in order, and
-/// a box of -1 waits for its object.
+/// The observations from one pose.  Objects are given by their rows.  Rows from the number of
+/// objects on are new objects, in order.  A box of object -1 waits for its object.
 struct StepObservations {
   IndexVector object;
   RowMatrix box;                               ///< (n, 4) undistorted pixels
   RowMatrix covariance;                        ///< (n, 16) pixels^2
   BoolTable truncated;                         ///< (n, 4)
-  std::vector<MeasurementTable> measurements;  ///< one a kind; `pose` is not used
+  std::vector<MeasurementTable> measurements;  ///< one table per kind; `pose` is not used
   Eigen::VectorXd log_size_mean;               ///< of the new objects
   Eigen::VectorXd log_size_sigma;
 };
 
-/// Boxes by their rows in the history, and the object each is of now: -1 waits, those from the
-/// number of objects on are new, in order.
+/// New objects of boxes, which are given by their rows in the history.  A box of object -1 waits.
+/// Rows from the number of objects on are new objects, in order.
 struct NewLabels {
   IndexVector observation;
   IndexVector object;
-  RowMatrix ellipsoid;  ///< (m, 9) where the new objects start, log-Cholesky, in the world
+  RowMatrix ellipsoid;            ///< (m, 9) initial new objects, log-Cholesky, in the world
   Eigen::VectorXd log_size_mean;  ///< of the new objects
   Eigen::VectorXd log_size_sigma;
 };

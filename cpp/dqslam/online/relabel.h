@@ -1,5 +1,5 @@
-// Boxes that change objects: an association may decide late which boxes show which object, join two
-// objects, or give one up.
+// Changes of the objects that boxes show.  An association may decide late which object a box shows,
+// join two objects, or give one up.
 #pragma once
 
 #include <vector>
@@ -12,12 +12,13 @@ namespace dqslam::online {
 /// An object whose observations have changed.
 struct Relabeled {
   int object;
-  /// Poses before and after the longest absence that it has only now; the same where it has none.
+  /// The poses before and after the longest new absence of the object.  Both are equal if there is
+  /// none.
   int last, back;
 };
 
-/// Moves boxes from object to object, adds the new objects, and leaves the others where they are.
-/// The work is that of the boxes and of the observations of their objects.  Throws
+/// Moves boxes from object to object and adds the new objects.  The other objects do not move.  The
+/// work is linear in the boxes and in the observations of their objects.  Throws
 /// std::invalid_argument naming the table and the row, and then nothing has changed.
 template <typename Pose>
 std::vector<Relabeled> Relabel(const NewLabels& given, History<Pose>* history);

@@ -1,22 +1,22 @@
-// Which poses are minimized beside the window's, and when.
+// The schedule of smoothings: the poses that are minimized in addition to the window, and when.
 #pragma once
 
 #include "dqslam/online/options.h"
 
 namespace dqslam::online {
 
-/// What a minimization of the window says of how well all fits.
+/// How well a minimization of the window fits.
 struct WindowFit {
-  int begin = 0, end = 0;  ///< its poses
-  double chi_square = 0;   ///< per residual: 1 where the model is right
+  int begin = 0, end = 0;  ///< the window has the poses from begin to end - 1
+  double chi_square = 0;   ///< per residual; 1 if the model is right
   int undefined = 0;       ///< observations whose objects are not in front
 };
 
-/// Poses from `begin` on; none where that is the window's begin.
+/// A smoothing of the poses from `begin` on.  There is none if that is the begin of the window.
 struct Smoothing {
   int begin = 0;
   int iterations = 0;
-  int rounds = 2;  ///< objects in a wrong place are started again between two
+  int rounds = 2;  ///< objects in wrong places are reinitialized between two rounds
   bool closes_loop = false;
 };
 
@@ -24,20 +24,20 @@ class Schedule {
  public:
   explicit Schedule(const OnlineOptions& options) : options_(options) {}
 
-  /// An object is seen from the pose `back` that was seen last from the pose `last`: returns
-  /// whether it closes a loop, for which the window is watched from the pose `now` on.
+  /// Registers an object that is observed from the pose `back` and was last observed from `last`.
+  /// Returns whether it closes a loop.  If so, the fit of the window is watched from `now` on.
   bool WatchLoop(int last, int back, int now);
-  /// The loop that is watched for does not fit, whatever the window shows.
+  /// Registers that the watched loop does not fit, whatever the fit of the window is.
   void LoopDoesNotFit() { loop_misfits_ = true; }
 
-  /// Whether the last poses and their young objects are to start again.
+  /// Whether the last poses and their young objects must be reinitialized.
   bool Recovers(const WindowFit& window);
 
-  /// Called once a step.
+  /// Chooses the smoothing of a step.  It is called once per step.
   Smoothing Choose(const WindowFit& window);
 
-  /// The work is square in the objects of the front: where there are many, medium and long
-  /// smoothings have fewer poses.
+  /// Registers the size of a smoothing.  The work is quadratic in the objects of the front.  If
+  /// there are many, the next medium and long smoothings have fewer poses.
   void SmoothedWith(int poses, int objects_in_front);
 
  private:
@@ -45,13 +45,13 @@ class Schedule {
   int Shortened(int poses) const;
 
   OnlineOptions options_;
-  int loop_begin_ = 0;         // the pose that last saw what has come back
-  int loop_until_ = -1;        // until when the window is watched for it
-  bool loop_misfits_ = false;  // known from late labels: no watching is needed
-  double loop_credit_ = 1;     // loops that may be closed now
+  int loop_begin_ = 0;         // the last pose from which the object was observed before
+  int loop_until_ = -1;        // the window is watched for the loop until this pose
+  bool loop_misfits_ = false;  // known from late labels, without watching the window
+  double loop_credit_ = 1;     // number of loops that may be closed now
   int next_medium_ = 0, next_long_ = 0;
   int next_recovery_ = 0;
-  double front_objects_ = 0;  // of the last smoothing that was longer than a short one
+  double front_objects_ = 0;  // in the last smoothing that was longer than a short one
 };
 
 }  // namespace dqslam::online

@@ -1,6 +1,6 @@
 """The command line: one module per command, combined here. It is the only part that prints.
 
-A command's module has heavy imports only inside its functions, so that `dqslam --help` is fast.
+The modules import heavy packages only inside functions, so that `dqslam --help` is fast.
 """
 
 import sys
@@ -35,7 +35,7 @@ EXIT_CODES = {
     0: "done",
     1: "a mistake in dqslam itself; its traceback is shown",
     2: "bad input: options, files, or a problem that they do not determine",
-    3: "done, and `inspect --strict` has found what looks like a mistake",
+    3: "done, and `inspect --strict` has found a likely mistake",
     130: "stopped by Ctrl-C",
 }
 
@@ -57,7 +57,7 @@ def _say_version(asked: bool) -> None:
 def _dqslam(
     _: Annotated[
         bool,
-        typer.Option("--version", is_eager=True, callback=_say_version, help="Say which it is."),
+        typer.Option("--version", is_eager=True, callback=_say_version, help="Print the version."),
     ] = False,
 ) -> None:
     """Object SLAM with dual quadrics: objects and trajectory from odometry and boxes."""
@@ -76,8 +76,8 @@ _UsageError: Any = typer.BadParameter.__mro__[1]
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command and return its exit code, one of `EXIT_CODES`.
 
-    Bad input gives one line on stderr; a file of settings gives one for each mistake. An error of
-    our own keeps its traceback.
+    Bad input gives one line on stderr, and a file of settings one line for each mistake. A mistake
+    in dqslam itself keeps its traceback.
     """
     try:
         code = app(arguments, prog_name="dqslam", standalone_mode=False) or 0

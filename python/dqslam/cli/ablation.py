@@ -84,7 +84,7 @@ def _name(row: "Row") -> str:
     variant = row.variant
     if variant.wrong_ids is None:
         return f"{_words(variant.start.name)}, {_words(variant.schedule.name)}"
-    return "told the right ids" if variant.told else _words(variant.loss.name)
+    return "oracle" if variant.oracle else _words(variant.loss.name)
 
 
 def _words(name: str) -> str:

@@ -11,32 +11,37 @@ from dqslam.cli.settings import ConfigFile
 
 
 def convert(
-    source: Annotated[Path, typer.Argument(metavar="IN", help="A file, a folder of YOLO, a bag.")],
-    out: Annotated[Path, typer.Argument(metavar="OUT", help="What to write.")],
+    source: Annotated[
+        Path, typer.Argument(metavar="IN", help="File, YOLO folder, or bag to read.")
+    ],
+    out: Annotated[Path, typer.Argument(metavar="OUT", help="File or folder to write.")],
     format_: Annotated[
         str | None,
-        typer.Option("--format", metavar="NAME", help="Of IN. Default: told by its look."),
+        typer.Option("--format", metavar="NAME", help="Format of IN. Default: recognized."),
     ] = None,
     to: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Of OUT. Default: told by its ending.")
+        str | None, typer.Option(metavar="NAME", help="Format of OUT. Default: by its ending.")
     ] = None,
     camera: Annotated[
-        Path | None, typer.Option(help="Its image size is what YOLO's boxes are shares of.")
+        Path | None, typer.Option(help="Camera file with the image size, which YOLO boxes need.")
     ] = None,
     frame_times: FrameTimesFile = None,
     frame_rate: FrameRate = None,
     classes: Annotated[
         Path | None,
-        typer.Option(help="Names of classes: COCO JSON, data.yaml, or a text, one a line."),
+        typer.Option(
+            help="Names of classes: COCO JSON, data.yaml, or text with one name per line."
+        ),
     ] = None,
     camera_in_body: Annotated[
         Path | None,
         typer.Option(
-            help="body_from_camera, of a trajectory that is the body's: 7, 12, 16 numbers."
+            help="File with body_from_camera, 7, 12 or 16 numbers, if the poses are a body's."
         ),
     ] = None,
     topic: Annotated[
-        list[str] | None, typer.Option(metavar="NAME", help="Of a bag with several; repeatable.")
+        list[str] | None,
+        typer.Option(metavar="NAME", help="Topic, if a bag has several of a kind; repeatable."),
     ] = None,
     config: ConfigFile = None,
     quiet: Quiet = False,

@@ -19,13 +19,13 @@ if TYPE_CHECKING:
 def degeneracy(
     context: typer.Context,
     out: ResultDirectory,
-    trials: Annotated[int, typer.Option(min=1, help="Objects to see along each motion.")] = 50,
+    trials: Annotated[int, typer.Option(min=1, help="Objects to observe along each motion.")] = 50,
     seed: FirstSeed = 0,
     config: ConfigFile = None,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
-    """Observe objects along four motions on the plane, poses known, and solve from three starts.
+    """Observe objects along four known motions on the plane, and solve from three starts.
 
     Writes degeneracy.json, degeneracy.png and config.toml.
     """
@@ -40,7 +40,7 @@ def degeneracy(
 
 
 def _results(table: "DegeneracyTable") -> "Table":
-    """Return the table: for each motion, a block with weakest singular values and all methods."""
+    """Return the table, with a block of the last singular values and all methods per motion."""
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 

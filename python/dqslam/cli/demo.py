@@ -42,7 +42,7 @@ def demo(
 ) -> None:
     """Simulate a few drives past objects, solve each from odometry and boxes, and draw them.
 
-    It takes seconds, and writes a directory for each drive (trajectory.txt, map.json, ...),
+    It takes seconds. It writes a directory for each drive (trajectory.txt, map.json and so on),
     demo.json, maps.png and config.toml.
     """
     from dqslam import io

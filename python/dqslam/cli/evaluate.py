@@ -15,40 +15,48 @@ if TYPE_CHECKING:
 
 def evaluate(
     context: typer.Context,
-    directory: Annotated[Path, typer.Argument(metavar="DIR", help="What `dqslam run` wrote.")],
+    directory: Annotated[
+        Path, typer.Argument(metavar="DIR", help="Directory that `dqslam run` wrote.")
+    ],
     groundtruth: Annotated[
         Path, typer.Option(help="True trajectory, world_from_camera, in any world frame.")
     ],
     align: Annotated[
         Literal["se3", "sim3", "se2", "none"],
-        typer.Option(help="Motion between both worlds to remove: rigid, with scale, on the plane."),
+        typer.Option(
+            help="Motion between both worlds to remove: rigid, with scale, on the plane, or none."
+        ),
     ] = "se3",
     rpe_delta: Annotated[
-        float, typer.Option(help="Frames or meters over which the relative pose error is taken.")
+        float, typer.Option(help="Distance for the relative pose error, in frames or meters.")
     ] = 1.0,
     rpe_unit: Annotated[
-        Literal["frames", "meters"], typer.Option(help="What --rpe-delta counts.")
+        Literal["frames", "meters"], typer.Option(help="Unit of --rpe-delta.")
     ] = "frames",
     objects: Annotated[
         Path | None, typer.Option(help="CSV of true objects: x,y,z,class_name,sx,sy,sz,...")
     ] = None,
     match: Annotated[
-        Literal["nearest", "id"], typer.Option(help="Which object is which true one.")
+        Literal["nearest", "id"],
+        typer.Option(help="Match objects with the nearest true one, or by id."),
     ] = "nearest",
     gate: Annotated[
         float | None,
         typer.Option(
-            help="Meters within which a nearest one counts. Default: the object's longest side, "
-            "1 m where sizes are unknown."
+            help="Largest distance of a match by nearest, in meters. Default: the longest side of "
+            "the true object, or 1 m if sizes are unknown."
         ),
     ] = None,
     boxes: Annotated[
-        Path | None, typer.Option(help="CSV of boxes of known objects: judges the association.")
+        Path | None,
+        typer.Option(help="CSV of boxes with true object ids, to evaluate the association."),
     ] = None,
-    box_ids: Annotated[str, typer.Option(help="Its column of object ids.")] = "track_id",
+    box_ids: Annotated[str, typer.Option(help="Column of --boxes with the ids.")] = "track_id",
     max_time_difference: Annotated[
         float | None,
-        typer.Option(help="Seconds that count as the same. Default: half the interval of poses."),
+        typer.Option(
+            help="Most seconds between compared poses. Default: half the interval of poses."
+        ),
     ] = None,
     config: ConfigFile = None,
     quiet: Quiet = False,

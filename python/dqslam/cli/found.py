@@ -36,7 +36,7 @@ def truth_of(
 def read_with_truth(
     directory: Path, groundtruth: Path | None, objects: Path | None
 ) -> tuple[Results, Trajectory | None, TrueObjects | None]:
-    """Read results and what is true of them, as far as there is any."""
+    """Read results, and the true trajectory and objects if there are any."""
     from dqslam import io
 
     results = io.load_results(results_in(directory))

@@ -35,7 +35,7 @@ def inspect(
     frame_rate: FrameRate = None,
     ids: Annotated[
         Literal["track_id", "class_id"] | None,
-        typer.Option(help="The column that tells objects apart. Default: boxes that overlap."),
+        typer.Option(help="Column with the ids of objects. Default: boxes are linked by overlap."),
     ] = None,
     max_time_difference: MaxTimeDifference = None,
     strict: Annotated[

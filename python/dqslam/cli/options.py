@@ -8,45 +8,54 @@ import typer
 if TYPE_CHECKING:
     from dqslam.io import FrameTimes
 
-CameraFile = Annotated[Path, typer.Option(help="Camera: JSON, TOML, ROS, COLMAP, KITTI, bag.")]
-OdometryFile = Annotated[Path, typer.Option(help="Trajectory: TUM, KITTI, EuRoC, bag.")]
-DetectionFile = Annotated[Path, typer.Option(help="Boxes: CSV, COCO, YOLO, MOT, bag.")]
+CameraFile = Annotated[Path, typer.Option(help="Camera file: JSON, TOML, ROS, COLMAP, KITTI, bag.")]
+OdometryFile = Annotated[Path, typer.Option(help="Trajectory file: TUM, KITTI, EuRoC, bag.")]
+DetectionFile = Annotated[
+    Path, typer.Option(help="File or folder of boxes: CSV, COCO, YOLO, MOT, bag.")
+]
 Formats = Annotated[
     list[str] | None,
-    typer.Option("--format", metavar="NAME", help="Format of a file that is not recognized."),
+    typer.Option(
+        "--format", metavar="NAME", help="Format of a file that is not recognized; repeatable."
+    ),
 ]
 FrameTimesFile = Annotated[
-    Path | None, typer.Option(help="Times of frames: KITTI times.txt, TUM rgb.txt, frames.csv.")
+    Path | None,
+    typer.Option(help="File of the times of frames: KITTI times.txt, TUM rgb.txt, CSV."),
 ]
 FrameRate = Annotated[
-    float | None, typer.Option(metavar="HZ", help="Or frames per second, with frame 0 at 0 s.")
+    float | None,
+    typer.Option(
+        metavar="HZ",
+        help="Frames per second, with frame 0 at 0 s. Default: --frame-times or the files.",
+    ),
 ]
 MaxTimeDifference = Annotated[
     float | None,
-    typer.Option(help="Seconds from a box to its pose. Default: half the interval of poses."),
+    typer.Option(help="Most seconds from a box to its pose. Default: half the interval of poses."),
 ]
 ResultDirectory = Annotated[
     Path, typer.Option("--out", metavar="DIR", help="Directory of the results, created if needed.")
 ]
 FirstSeed = Annotated[
-    int, typer.Option(min=0, help="Seed of the first trial; the next ones count up.")
+    int, typer.Option(min=0, help="Seed of the first trial; each next trial adds 1.")
 ]
 Jobs = Annotated[
-    int | None, typer.Option(min=1, help="Processes at a time. Default: as many as cores.")
+    int | None, typer.Option(min=1, help="Number of processes. Default: one per core.")
 ]
 BackendName = Annotated[
     Literal["serial", "processes", "loky", "dask", "ray"] | None,
     typer.Option(
         "--backend",
         help="Where trials run: this process, other processes (Python's or joblib's loky), or a "
-        "cluster. Default: loky if joblib is installed, else processes.",
+        "cluster. Default: serial for one job, else loky if joblib is installed, else processes.",
     ),
 ]
 Scheduler = Annotated[
     str | None,
     typer.Option(
         metavar="ADDRESS",
-        help="Cluster's address, for dask tcp://host:8786. Default: a cluster on this machine.",
+        help="Address of a cluster, like tcp://host:8786 for dask. Default: one on this machine.",
     ),
 ]
 
@@ -54,25 +63,27 @@ Scheduler = Annotated[
 TruthFile = Annotated[
     Path | None,
     typer.Option(
-        help="True trajectory, in any world. Default: groundtruth.txt in DIR or beside it."
+        help="True trajectory, in any world frame. Default: groundtruth.txt in DIR or its parent."
     ),
 ]
 TrueObjectsFile = Annotated[
     Path | None,
-    typer.Option(help="CSV of true objects. Default: objects.csv beside groundtruth.txt."),
+    typer.Option(
+        help="CSV of true objects. Default: objects.csv beside groundtruth.txt, if that is used."
+    ),
 ]
 Alignment = Annotated[
     Literal["se3", "sim3", "se2", "none"],
-    typer.Option(help="Motion between both worlds: rigid, with scale, on the plane."),
+    typer.Option(help="Motion between both worlds: rigid, with scale, on the plane, or none."),
 ]
 
 
 def given_frame_times(table: Path | None, rate: float | None) -> "FrameTimes | None":
-    """Return the times of frames that these two options give, if one of them is given."""
+    """Return the times of frames from these two options, or None without either."""
     from dqslam import io
 
     if table is not None and rate is not None:
-        raise ValueError("--frame-times and --frame-rate both say when a frame was taken")
+        raise ValueError("--frame-times and --frame-rate both give the times of frames")
     if table is not None:
         return io.read_frame_times(table)
     return None if rate is None else io.frame_rate(rate)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
 Quiet = Annotated[
-    bool, typer.Option("--quiet", "-q", help="Say nothing but errors.", rich_help_panel="Output")
+    bool, typer.Option("--quiet", "-q", help="Print nothing but errors.", rich_help_panel="Output")
 ]
 Json = Annotated[
     bool,

@@ -35,8 +35,8 @@ SCORES = {
     "optimum_rate": "share at optimum",
     "inlier_precision": "inliers, precision",
     "inlier_recall": "inliers, recall",
-    "oracle_rmse_pos": "told ids: positions",
-    "oracle_rmse_landmark": "told ids: centers",
+    "oracle_rmse_pos": "oracle: positions",
+    "oracle_rmse_landmark": "oracle: centers",
     "objects_dropped": "objects left out",
 }
 EXAMPLES = 6  # maps drawn, as in the paper's figure
@@ -51,26 +51,26 @@ def paper(
         str,
         typer.Option(
             metavar="NAME|FILE",
-            help="paper; orbit: SE(3), hand-held; honest, honest_orbit: all drawn as believed; "
-            "or a TOML file like theirs.",
+            help="paper; orbit: hand-held, in SE(3); honest and honest_orbit: the same, drawn from "
+            "the assumptions of the estimator; or a TOML file like theirs.",
         ),
     ] = "paper",
     objects: Annotated[
         Literal["cubes", "ellipsoids"] | None,
         typer.Option(
-            help="cubes: as in the paper; ellipsoids: no model error. Default: the scenario's."
+            help="cubes, as in the paper; ellipsoids, without model error. Default: the scenario's."
         ),
     ] = None,
     method: Annotated[
         Literal["dqslam", "paper"],
-        typer.Option(help="dqslam: our best estimator; paper: as published."),
+        typer.Option(help="dqslam: the default estimator; paper: the published method."),
     ] = "dqslam",
     bound: Annotated[
         bool,
         typer.Option(
             "--bound",
-            help="Compare with the posterior bound and the optimum. Of ellipsoids, the noise of "
-            "the boxes and the spread of the sizes are then told.",
+            help="Compare with the posterior bound and the optimum. For ellipsoids, the estimator "
+            "then uses the true noise of the boxes and the true spread of the sizes.",
         ),
     ] = False,
     wrong_associations: Annotated[
@@ -79,7 +79,7 @@ def paper(
     ] = 0.0,
     wrong_association_kind: Annotated[
         Literal["random", "structured"],
-        typer.Option(help="Whose id: any other object's, or the nearest one's."),
+        typer.Option(help="Wrong ids are those of any other object, or of the nearest one."),
     ] = "random",
     loss: Annotated[
         Literal["none", "huber", "cauchy", "dcs", "switchable", "gnc_tls", "gnc_gm"] | None,

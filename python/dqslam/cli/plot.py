@@ -32,7 +32,8 @@ def plot(
     directory: Annotated[
         Path,
         typer.Argument(
-            metavar="DIR", help="What `dqslam run`, `dqslam simulate` or `dqslam sweep` wrote."
+            metavar="DIR",
+            help="Directory that `dqslam run`, `dqslam simulate` or `dqslam sweep` wrote.",
         ),
     ],
     out: Annotated[
@@ -49,16 +50,16 @@ def plot(
         Path | None,
         typer.Option(
             metavar="FOLDER",
-            help="Draw the outlines of the objects over these images too: by times that are their "
-            "names, by order, or by --frame-times.",
+            help="Also draw the outlines of the objects over these images. Their times come from "
+            "--frame-times, from their names, or from their order.",
         ),
     ] = None,
     frames: Annotated[
         str | None,
         typer.Option(
             metavar="POSES",
-            help="Which of them, counted from 0: 0,17,100-200, or 0-1000:10 for every tenth. "
-            f"Default: {_STILLS} spread evenly, of a film all.",
+            help="Images of these poses, counted from 0: 0,17,100-200, or 0-1000:10 for every "
+            f"tenth. Default: {_STILLS} that are evenly spread, or all for a film.",
         ),
     ] = None,
     frame_times: FrameTimesFile = None,
@@ -66,18 +67,21 @@ def plot(
     video: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE", help="Make a film of them instead: .mp4 (needs ffmpeg) or .gif."
+            metavar="FILE", help="Make a film of the images instead: .mp4 (needs ffmpeg) or .gif."
         ),
     ] = None,
     video_rate: Annotated[
         float | None,
         typer.Option(
-            metavar="HZ", min=0.1, max=120.0, help="Its frames per second. Default: as it was."
+            metavar="HZ",
+            min=0.1,
+            max=120.0,
+            help="Frames per second of the film. Default: real time if possible, else 10.",
         ),
     ] = None,
     parameter: Annotated[
         str | None,
-        typer.Option(help="Of a sweep: the setting to draw along. Default: the first varied."),
+        typer.Option(help="For a sweep: the setting of the axis. Default: the first varied one."),
     ] = None,
     config: ConfigFile = None,
     quiet: Quiet = False,
@@ -85,8 +89,8 @@ def plot(
 ) -> None:
     """Draw the results in DIR: the map from above, errors over time, residuals, boxes.
 
-    For a sweep, it draws the errors against the varied settings. It needs the extra "plot";
-    docs/plots.md describes each figure. The options go into plot.toml beside the figures.
+    For a sweep, it draws the errors against the varied settings. It needs the extra "plot".
+    docs/plots.md describes each figure. Options are written to plot.toml beside the figures.
     """
     from dqslam import io
     from dqslam.plot import plot_results
@@ -94,7 +98,7 @@ def plot(
     if find_spec("matplotlib") is None:
         raise ValueError("figures need matplotlib: pip install 'dqslam[plot]'")
     if images is None and (video is not None or frames is not None):
-        raise ValueError("--frames and --video are of --images, which is not given")
+        raise ValueError("--frames and --video need --images")
     if video is not None:
         from dqslam.plot.overlay import check_video
 
@@ -106,10 +110,10 @@ def plot(
         files = [_plot_sweep(directory, out, kind, parameter, output)]
     else:
         if parameter is not None:
-            raise ValueError(f"--parameter is of a sweep, which {directory} is not")
+            raise ValueError(f"--parameter needs a sweep, which {directory} is not")
         results, truth, true_objects = read_with_truth(directory, groundtruth, objects)
         shown: dict[int, Path] = {}
-        if images is not None:  # before anything is written: can they be told apart?
+        if images is not None:  # fails before anything is written if poses are unclear
             times = given_frame_times(frame_times, frame_rate)
             shown = _choose(
                 frames, io.find_images(images, results.timestamps, times), is_film=video is not None
@@ -159,7 +163,7 @@ def _overlay(
     rate: float | None,
     output: Output,
 ) -> list[Path]:
-    """Write images, by their poses, with what the map has of them: the files."""
+    """Write images, by their poses, with the outlines of the map, and return the files."""
     from dqslam.plot.overlay import Overlay, save_stills, save_video
 
     overlay = Overlay(results)
@@ -171,7 +175,7 @@ def _overlay(
 
 
 def _choose(frames: str | None, images: dict[int, Path], *, is_film: bool) -> dict[int, Path]:
-    """Return the selected images; by default all for a film, else a few."""
+    """Return the selected images, by default all for a film and else a few."""
     poses = sorted(images)
     if frames is None and (is_film or len(poses) <= _STILLS):
         return {pose: images[pose] for pose in poses}

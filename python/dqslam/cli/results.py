@@ -27,7 +27,7 @@ SomeTable = TypeVar("SomeTable", bound=Table)
 
 
 def draw_figure(output: Output, path: Path, draw: Callable[[Path], None]) -> None:
-    """Draw an image file, or print why there is none, because figures are an extra."""
+    """Draw an image file, or print why there is none: matplotlib is an extra."""
     if find_spec("matplotlib") is None:
         output.line(f"no {path.name}: matplotlib is missing (pip install 'dqslam[plot]')")
         return
@@ -43,7 +43,7 @@ def save_study(
     path: Path,
     draw: Callable[[SomeTable, Path], None],
 ) -> None:
-    """Write the table of a study, the options that made it, and its figure beside it."""
+    """Write the table of a study, with its options and its figure beside it."""
     with uninterrupted():
         table.save(path)
         save_settings(context, path.with_name(CONFIG))

@@ -43,8 +43,8 @@ def run(
     ids: Annotated[
         Literal["none", "track_id", "class_id"],
         typer.Option(
-            help="What tells objects apart: nothing yet, the column of a tracker, or the class, "
-            "where each occurs once."
+            help="Where the ids of objects come from: there are none, a tracker, or the class, if "
+            "each class has one object."
         ),
     ] = "track_id",
     trust_ids: Annotated[
@@ -52,33 +52,36 @@ def run(
         typer.Option(
             min=0.5,
             max=1.0,
-            help="Probability that an id stays with its object; 1: ids are final, below: boxes "
-            "without ids take part, ids are cut and joined.",
+            help="Probability that an id stays with its object. With 1, ids are final. With less, "
+            "boxes without ids are used too, and ids are split and joined.",
         ),
     ] = 1.0,
     mode: Annotated[
-        Literal["slam", "mapping"], typer.Option(help="mapping: the odometry is the truth.")
+        Literal["slam", "mapping"],
+        typer.Option(help="slam estimates the path too; mapping keeps the odometry."),
     ] = "slam",
     perturb_odometry: Annotated[
         str | None,
         typer.Option(
-            metavar="NOISE", help=f'Add noise of that sigma to every step, m and rad: "{NOISE}".'
+            metavar="NOISE", help=f'Add noise of this sigma to every step, m and rad: "{NOISE}".'
         ),
     ] = None,
     seed: Annotated[
-        int, typer.Option(min=0, help="Seed of that noise, and of the boxes held out.")
+        int, typer.Option(min=0, help="Seed of that noise, and of the choice of boxes to hold out.")
     ] = 0,
     odometry_noise: Annotated[
         str | None,
         typer.Option(
             metavar="NOISE",
-            help="What to believe of every step, likewise. Default: the noise that was added, "
-            "else its level is estimated from the boxes.",
+            help="Sigma to assume for every step, in the same form. Default: the noise that was "
+            "added, or else a level that is estimated from the boxes.",
         ),
     ] = None,
     odometry_covariance: Annotated[
         Path | None,
-        typer.Option(help="In its place: CSV of the covariance of each step, m and rad squared."),
+        typer.Option(
+            help="CSV of the covariance of each step, m and rad squared, instead of one sigma."
+        ),
     ] = None,
     groundtruth: Annotated[
         Path | None, typer.Option(help="TUM trajectory to compare with, in any world frame.")
@@ -91,13 +94,15 @@ def run(
     ] = None,
     hold_out: Annotated[
         float,
-        typer.Option(min=0.0, max=0.99, help="Share of boxes that the map is tested on instead."),
+        typer.Option(
+            min=0.0,
+            max=0.99,
+            help="Share of boxes that the estimator does not use, to test the map.",
+        ),
     ] = 0.0,
     online: Annotated[
         bool,
-        typer.Option(
-            "--online", help="Replay it step by step, as it would arrive, and polish at the end."
-        ),
+        typer.Option("--online", help="Replay the recording step by step, and polish at the end."),
     ] = False,
     max_time_difference: MaxTimeDifference = None,
     config: ConfigFile = None,
@@ -106,7 +111,7 @@ def run(
 ) -> None:
     """Estimate the trajectory and the objects of a recording.
 
-    Writes trajectory.txt, odometry.txt (what it started from), map.json, boxes.csv, camera.json,
+    Writes trajectory.txt, odometry.txt (the initial poses), map.json, boxes.csv, camera.json,
     report.json and config.toml.
     """
     from dqslam import _core, io
@@ -116,9 +121,9 @@ def run(
     added = parse_noise("--perturb-odometry", perturb_odometry)
     believed = parse_noise("--odometry-noise", odometry_noise)
     if odometry_covariance is not None and (added or believed):
-        raise ValueError("--odometry-covariance: the noise is given already, by another option")
+        raise ValueError("--odometry-covariance: another option gives the noise already")
     if online and mode == "mapping":
-        raise ValueError("--online: does not go with --mode mapping")
+        raise ValueError("--online: cannot be combined with --mode mapping")
     options = RunFilesOptions(
         ids=ids,
         trust_ids=trust_ids,
@@ -135,7 +140,7 @@ def run(
         odometry_covariance=odometry_covariance,
     )
     output = Output(quiet=quiet, as_json=json)
-    # Of a session a line says what happens, else a bar the share that is done.
+    # A session shows a line with its state, a batch a bar with the share that is done.
     shown: AbstractContextManager[Callable[[Any], None]] = (
         output.live("loading") if online else output.share("estimating")
     )
@@ -157,7 +162,7 @@ def run(
 
 
 def parse_noise(option: str, text: str | None) -> "OdometryNoise | None":
-    """Read "translation=0.02,rotation=0.01", both needed, None of None."""
+    """Read text like "translation=0.02,rotation=0.01"; both are needed. None gives None."""
     from dqslam.assumptions import OdometryNoise
 
     if text is None:

@@ -56,7 +56,7 @@ ConfigFile = Annotated[
         metavar="FILE",
         is_eager=True,
         callback=_read,
-        help="TOML file of options, as a result's config.toml; what the command line says wins.",
+        help="TOML file of options, like config.toml of a result. The command line overrides it.",
     ),
 ]
 

@@ -21,8 +21,9 @@ def simulate(
         str,
         typer.Argument(
             metavar="[NAME|FILE]",
-            help="paper: a drive on the plane; orbit: hand-held, in space; honest, honest_orbit; "
-            "or a TOML file like theirs.",
+            help="paper: a drive on the plane; orbit: hand-held, in space; honest and "
+            "honest_orbit: the same, drawn from the assumptions of the estimator; or a TOML file "
+            "like theirs.",
         ),
     ] = "paper",
     seed: Annotated[int, typer.Option(min=0, help="Seed of the world and of all noise.")] = 0,

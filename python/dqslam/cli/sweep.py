@@ -22,7 +22,7 @@ NAMED = 5  # number of failures of one kind that are named
 def sweep(
     context: typer.Context,
     file: Annotated[
-        Path, typer.Argument(help="TOML: a scenario, seeds, and the settings to vary.")
+        Path, typer.Argument(help="TOML file with a scenario, seeds, and the settings to vary.")
     ],
     out: ResultDirectory,
     jobs: Jobs = None,
@@ -51,7 +51,7 @@ def sweep(
         save_settings(context, out / CONFIG)
     output.table(_table(done.summary))
     if done.found:
-        output.line(f"{done.done} trials run, {done.found} were there already")
+        output.line(f"{done.done} trials run, {done.found} were finished before")
     for line in _failures(done.failures):
         output.line(line)
     for path in done.files[:-1]:
@@ -115,7 +115,7 @@ def _number(number: float, interval: tuple[float, float] | None = None) -> str:
 
 
 def _failures(failures: Mapping[str, str]) -> list[str]:
-    """Print each error once, with the trials that it ended."""
+    """Return a line for each error, with the trials that it ended."""
     trials: dict[str, list[str]] = {}
     for trial, error in failures.items():
         trials.setdefault(error, []).append(trial)

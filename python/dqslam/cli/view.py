@@ -20,14 +20,16 @@ def view(
     context: typer.Context,
     directory: Annotated[
         Path,
-        typer.Argument(metavar="DIR", help="What `dqslam run` wrote, or `dqslam simulate` before."),
+        typer.Argument(
+            metavar="DIR", help="Directory that `dqslam run` or `dqslam simulate` wrote."
+        ),
     ],
     groundtruth: TruthFile = None,
     objects: TrueObjectsFile = None,
     align: Alignment = "se3",
     export: Annotated[
         Path | None,
-        typer.Option(metavar="PAGE", help="Write a folder that any web server shows, and stop."),
+        typer.Option(metavar="PAGE", help="Write a folder for any web server, and stop."),
     ] = None,
     rerun: Annotated[
         Path | None, typer.Option(metavar="FILE.rrd", help="Write a Rerun recording, and stop.")
@@ -36,18 +38,21 @@ def view(
         Path | None, typer.Option(metavar="FILE.ply", help="Write the map as PLY, and stop.")
     ] = None,
     host: Annotated[
-        str, typer.Option(help="Address of the live page; 0.0.0.0 lets other machines in.")
+        str, typer.Option(help="Address of the live page; 0.0.0.0 lets other machines connect.")
     ] = "127.0.0.1",
     port: Annotated[
-        int, typer.Option(min=1, max=65535, help="Its port, or the next one that is free.")
+        int,
+        typer.Option(
+            min=1, max=65535, help="Port of the live page, or the first free one after it."
+        ),
     ] = 8080,
     config: ConfigFile = None,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
-    """Show the map of DIR on a page: trajectory, cameras, objects, boxes, truth; Ctrl-C stops.
+    """Show the map of DIR on a page: trajectory, cameras, objects, boxes, truth. Ctrl-C stops it.
 
-    It needs the extra `view`, and --rerun needs the extra `rerun`; --export and --ply need none.
+    The live page needs the extra `view`, and --rerun needs `rerun`. --export and --ply need none.
     """
     from dqslam import io
     from dqslam._colors import ESTIMATE

@@ -12,7 +12,7 @@ from dqslam.io import BoxTable, Results, TrueBoxes, nearest_pose
 from dqslam.metrics import match_boxes, reprojection_iou, score_association
 
 
-def judge_reprojection(results: Results) -> dict[str, Any] | None:
+def evaluate_reprojection(results: Results) -> dict[str, Any] | None:
     """Compare the boxes of mapped objects with the projections of these.
 
     There are results for all boxes that were used, for those of them that fit, and for those that
@@ -57,7 +57,7 @@ def _describe(overlap: Floats, chosen: Bools) -> dict[str, Any]:
     }
 
 
-def judge_association(
+def evaluate_association(
     results: Results,
     truth: TrueBoxes,
     *,
@@ -90,10 +90,10 @@ def judge_association(
             f"{truth.path}: no box within {max_time_difference:g} s of a pose of the estimate"
         )
     true_pose, true_boxes, true_id = true_pose[near], truth.box[near], truth.object_id[near]
-    judged = np.isin(boxes.pose, true_pose) & ~boxes.held_out
-    pose, box = boxes.pose[judged], boxes.box[judged]
+    compared = np.isin(boxes.pose, true_pose) & ~boxes.held_out
+    pose, box = boxes.pose[compared], boxes.box[compared]
     match = match_boxes(pose, box, true_pose, true_boxes, min_iou=min_iou)
     shown = np.where(match >= 0, true_id[match], -1)
     known = (match < 0) | (shown >= 0)
-    score = score_association(pose[known], boxes.object_id[judged][known], shown[known])
+    score = score_association(pose[known], boxes.object_id[compared][known], shown[known])
     return {"min_iou": min_iou, **asdict(score)}

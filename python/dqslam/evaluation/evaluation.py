@@ -7,9 +7,9 @@ from typing import Any, Literal
 import numpy as np
 
 from dqslam._checks import Floats
-from dqslam.evaluation.boxes import judge_association, judge_reprojection
-from dqslam.evaluation.objects import Match, judge_objects
-from dqslam.evaluation.trajectory import common_poses, judge_trajectory
+from dqslam.evaluation.boxes import evaluate_association, evaluate_reprojection
+from dqslam.evaluation.objects import Match, evaluate_objects
+from dqslam.evaluation.trajectory import common_poses, evaluate_trajectory
 from dqslam.io import Results, Trajectory, TrueBoxes, TrueObjects
 from dqslam.metrics import Align, Alignment, align_poses, align_positions
 
@@ -43,7 +43,7 @@ def evaluate_results(
     rpe_delta, rpe_unit
         The distance for the relative pose error, see ``relative_pose_error``.
     objects, match, gate
-        The true objects and how to match them, see ``judge_objects``.
+        The true objects and how to match them, see ``evaluate_objects``.
     boxes
         Boxes of known objects, to evaluate the association.
     max_time_difference
@@ -55,19 +55,21 @@ def evaluate_results(
     rows, true_rows = common_poses(results.timestamps, groundtruth, max_time_difference)
     true_poses = groundtruth.world_from_camera[true_rows]
 
-    def judged(poses: Floats) -> tuple[dict[str, Any], dict[str, Any]]:
-        return judge_trajectory(
+    def errors_of(poses: Floats) -> tuple[dict[str, Any], dict[str, Any]]:
+        return evaluate_trajectory(
             poses[rows], true_poses, align=align, rpe_delta=rpe_delta, rpe_unit=rpe_unit
         )
 
-    ate, rpe = judged(results.poses)
-    odometry_ate, odometry_rpe = judged(results.initial_poses)
+    ate, rpe = errors_of(results.poses)
+    odometry_ate, odometry_rpe = errors_of(results.initial_poses)
     alignment, by = object_alignment(results, results.poses[rows], true_poses, align)
     object_errors, association = None, None
     if objects is not None:
-        object_errors = judge_objects(results.objects, objects, alignment, match=match, gate=gate)
+        object_errors = evaluate_objects(
+            results.objects, objects, alignment, match=match, gate=gate
+        )
     if boxes is not None:
-        association = judge_association(results, boxes, max_time_difference=max_time_difference)
+        association = evaluate_association(results, boxes, max_time_difference=max_time_difference)
     return {
         "align": align,
         "poses": len(rows),
@@ -82,7 +84,7 @@ def evaluate_results(
             "scale": alignment.scale,
         },
         "objects": object_errors,
-        "reprojection_iou": judge_reprojection(results),
+        "reprojection_iou": evaluate_reprojection(results),
         "association": association,
     }
 

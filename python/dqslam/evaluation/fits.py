@@ -1,4 +1,4 @@
-"""How well each box fits the map, for figures of residuals and of images."""
+"""The fit of each box to the map, for figures of residuals and of images."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ class BoxFits:
     """The noise that sigma is computed from."""
 
     @property
-    def is_whole(self) -> Bools:
+    def is_uncut(self) -> Bools:
         """Whether all four edges can be compared, shape (m,)."""
         return np.asarray(np.isfinite(self.residual).all(axis=1))
 
     @property
     def chi2(self) -> Floats:
-        """Sum of the squares of the residuals, shape (m,); NaN unless the box is whole."""
+        """Sum of the squares of the residuals, shape (m,); NaN unless the box is uncut."""
         return np.asarray(np.sum(self.residual**2, axis=1))
 
     def frames(self, least_boxes: int = 1) -> tuple[Ints, Floats]:

@@ -24,7 +24,7 @@ Match = Literal["nearest", "id"]
 GATE_WITHOUT_SIZES = 1.0
 
 
-def judge_objects(
+def evaluate_objects(
     objects: MapObjects,
     truth: TrueObjects,
     alignment: Alignment,

@@ -52,7 +52,7 @@ def common_poses(
     return rows, true_rows
 
 
-def judge_trajectory(
+def evaluate_trajectory(
     poses: Floats,
     true_poses: Floats,
     *,

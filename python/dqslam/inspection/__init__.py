@@ -14,7 +14,7 @@ from dqslam.inspection.checks import (
     check_image_size,
     check_pose_direction,
 )
-from dqslam.inspection.evidence import CannotTellError, Evidence
+from dqslam.inspection.evidence import Evidence, NotEnoughDataError
 from dqslam.inspection.evidence import Finding as Finding
 from dqslam.inspection.summary import summarize
 from dqslam.inspection.times import check_times
@@ -75,7 +75,7 @@ def inspect_recording(
             continue
         try:
             finding = check(evidence)
-        except CannotTellError as error:
+        except NotEnoughDataError as error:
             unchecked[name] = str(error)
             continue
         if finding is not None:

@@ -1,7 +1,7 @@
 """The usual mistakes. Each is found by comparing two interpretations of the same files.
 
 Each check takes the Evidence. It returns a Finding, or None if all is well, or raises
-CannotTellError. A finding needs another interpretation that explains the boxes far better. The
+NotEnoughDataError. A finding needs another interpretation that explains the boxes far better. The
 thresholds were chosen on recordings of four kinds, without mistakes and with each mistake planted.
 """
 
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dqslam import _core
-from dqslam.inspection.evidence import CannotTellError, Evidence, Finding, median_residual
+from dqslam.inspection.evidence import Evidence, Finding, NotEnoughDataError, median_residual
 from dqslam.inspection.rays import BEHIND_PX, Views, inverted, residuals
 from dqslam.io import FileError
 from dqslam.io.detections.table import checked
@@ -58,10 +58,10 @@ def check_pose_direction(evidence: Evidence) -> Finding | None:
     turned = replace(views, world_from_camera=inverted(views.world_from_camera))
     other = median_residual(evidence.camera, turned)
     if given == other == BEHIND_PX:
-        raise CannotTellError("no reading of the poses puts the objects in front of the camera")
+        raise NotEnoughDataError("no reading of the poses puts the objects in front of the camera")
     if other > DIRECTION_SHARE * given:
         if other < given / DIRECTION_SHARE:
-            raise CannotTellError(
+            raise NotEnoughDataError(
                 f"rays miss each other by {_px(given)}, with inverted poses by {_px(other)}"
             )
         return None
@@ -136,10 +136,12 @@ def check_distortion(evidence: Evidence) -> Finding | None:
     camera = evidence.camera
     views = evidence.views(evidence.tracks())
     if len(views.there) < LENS_TRACKS:
-        raise CannotTellError(f"only {len(views.there)} objects to tell a lens by")
+        raise NotEnoughDataError(f"only {len(views.there)} objects to compare lenses with")
     given = median_residual(camera, views)
     if given > LARGEST_LENS_PX:
-        raise CannotTellError(f"rays miss each other by {_px(given)}, too much to tell a lens by")
+        raise NotEnoughDataError(
+            f"rays miss each other by {_px(given)}, too much to compare lenses"
+        )
     if camera.has_distortion:
         bare = median_residual(_with_lens(camera, 0.0, 0.0), views) / given
         if bare <= BARE_SHARE:
@@ -154,7 +156,7 @@ def check_distortion(evidence: Evidence) -> Finding | None:
     meaning = (
         "is it the lens of another camera?"
         if camera.has_distortion
-        else "do the boxes come from a distorted image, and the camera does not say how?"
+        else "do the boxes come from a distorted image, without distortion in the camera file?"
     )
     return Finding(
         "distortion",
@@ -227,7 +229,7 @@ def _rays_prefer(evidence: Evidence, boxes: Floats) -> bool:
         tracks = evidence.tracks(boxes)
         given = median_residual(evidence.camera, evidence.views(tracks))
         other = median_residual(evidence.camera, evidence.views(tracks, boxes))
-    except CannotTellError:
+    except NotEnoughDataError:
         return False
     return other <= CORNERS_SHARE * given
 

@@ -23,7 +23,7 @@ class Finding:
     message: str
 
 
-class CannotTellError(Exception):
+class NotEnoughDataError(Exception):
     """A check has too little data for a conclusion."""
 
 
@@ -64,7 +64,7 @@ class Evidence:
         timely = (group[self.timely[group]] for group in find_tracks(table, self.ids))
         tracks = [group for group in timely if len(group) >= FEWEST_VIEWS]
         if not tracks:
-            raise CannotTellError("no object is seen often enough from known poses")
+            raise NotEnoughDataError("no object is seen often enough from known poses")
         return tracks
 
     def views(self, tracks: list[NDArray[np.int64]], boxes: Floats | None = None) -> Views:
@@ -82,5 +82,5 @@ def median_residual(camera: _core.Camera, views: Views) -> float:
     """Return the median distance of middles from the projected point of their track [px]."""
     off = residuals(camera, views)
     if np.isnan(off).all():
-        raise CannotTellError("no object is seen from directions that differ enough")
+        raise NotEnoughDataError("no object is seen from directions that differ enough")
     return float(np.nanmedian(off))

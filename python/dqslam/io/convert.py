@@ -1,4 +1,4 @@
-"""From one format to another: nothing is cut, and losses of a format are reported."""
+"""Conversion between formats. Boxes are not cut, and losses of a format are reported."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from dqslam.io.camera.rosbag import KIND as CAMERA_INFO
 from dqslam.io.detections import DETECTION_FORMATS, DetectionTable, read_detections
 from dqslam.io.detections.rosbag import KIND as DETECTION_ARRAY
 from dqslam.io.files import FileError, whole_folder
-from dqslam.io.formats import Format, Progress, choose_format, tell_nobody
+from dqslam.io.formats import Format, Progress, choose_format, no_progress
 from dqslam.io.frames import BY_NUMBER, FrameTimes, write_frame_times
 from dqslam.io.rosbag import NAME as BAG
 from dqslam.io.rosbag import bag_topics
@@ -64,9 +64,9 @@ def convert(
     to: str | None = None,
     topics: Sequence[str] = (),
     context: ConvertContext | None = None,
-    progress: Progress = tell_nobody,
+    progress: Progress = no_progress,
 ) -> list[Written]:
-    """Read one file and write it in another format, whole or not at all.
+    """Read a file and write it in another format; the result is complete or absent.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def convert(
         for done, kind in enumerate(kinds):
             _, name, target_name = FROM_BAG[kind]
             target = choose_format(out, target_name, FORMATS[kind], kind)
-            share = partial(_tell_part, progress, done, len(kinds))
+            share = partial(_part_progress, progress, done, len(kinds))
             more = _convert(
                 source, folder / name, kind, BAG, target, named.get(kind), context, share
             )
@@ -112,13 +112,13 @@ def convert(
     return written
 
 
-def _tell_part(progress: Progress, done: int, parts: int, share: float) -> None:
+def _part_progress(progress: Progress, done: int, parts: int, share: float) -> None:
     """Return a progress of one part that reports the share of all parts."""
     progress((done + share) / parts)
 
 
 def _kind(source: Path, format_name: str | None, to: str | None) -> str | None:
-    """Return the kind of the source, or None for a bag that is converted as a whole."""
+    """Return the kind of the source, or None for a bag whose kinds are all converted."""
     for name, option in ((to, "--to"), (format_name, "--format")):
         kinds = [kind for kind, known in KINDS.items() if name in known]
         if name is not None and not kinds:
@@ -148,7 +148,7 @@ def _target(out: Path, to: str | None, kind: str) -> Format[Any]:
         if out.suffix.lower() in format_.endings:
             return format_
     known = ", ".join(format_.name for format_ in FORMATS[kind] if format_.write)
-    raise ValueError(f"{out}: its ending tells no format of {kind}; name one with --to: {known}")
+    raise ValueError(f"{out}: its ending is of no format of {kind}; name one with --to: {known}")
 
 
 def _topics_by_kind(source: Path, topics: Sequence[str]) -> dict[str, str]:

@@ -1,4 +1,7 @@
-"""Rows, numbers, folders and JSON: errors name file and line, and files are written whole."""
+"""Rows, numbers, folders and JSON, with errors that name file and line.
+
+Files are written completely or not at all.
+"""
 
 from __future__ import annotations
 
@@ -51,7 +54,7 @@ def parse_integers(
 ) -> NDArray[np.int64]:
     """Turn the cells of one column into whole numbers, shape (n,); "5.0" is one."""
     values = parse_numbers(path, name, cells, lines)
-    # Beyond 2^53 a float cannot tell neighboring integers apart.
+    # Beyond 2^53, different integers have the same float.
     bad = np.flatnonzero((values != np.floor(values)) | (np.abs(values) >= 2.0**53))
     if bad.size:
         raise FileError(

@@ -15,7 +15,7 @@ Progress = Callable[[float], None]
 """A function that is called with the share of a file, 0 to 1, that has been read."""
 
 
-def tell_nobody(share: float) -> None:
+def no_progress(share: float) -> None:
     """Ignore the share."""
 
 

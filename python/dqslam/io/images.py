@@ -48,8 +48,8 @@ def find_images(
     raise FileError(
         folder,
         f"{len(files)} images (the first is {files[0].name}), {len(timestamps)} poses from "
-        f"{timestamps[0]:.6f} s: the names are not times of poses, hence say when frames were "
-        "taken with --frame-times or --frame-rate",
+        f"{timestamps[0]:.6f} s: the names are not times of poses, so the times of frames are "
+        "needed: --frame-times or --frame-rate",
     )
 
 

@@ -1,4 +1,4 @@
-"""A recording from files: boxes get the pose of their time and the object of their id."""
+"""Read a recording from files: each box gets the pose of its time and the object of its id."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from dqslam.io.step_covariances import read_step_covariances
 from dqslam.io.trajectory import read_trajectory
 from dqslam.recording import Detections, Odometry, Recording
 
-# With two boxes and a noisy path, an object's distance and size cannot be separated.
+# With two boxes and a noisy path, the distance of an object cannot be separated from its size.
 FEWEST_BOXES = 3
 
 Ids = Literal["none", "track_id", "class_id"]
@@ -28,9 +28,9 @@ Ids = Literal["none", "track_id", "class_id"]
 
 @dataclass(frozen=True)
 class Dropped:
-    """Numbers of boxes of the files that are not in the recording, by reason."""
+    """Numbers of boxes that are in the files but not in the recording, by reason."""
 
-    below_min_score: int  #: boxes
+    below_min_score: int  #: boxes whose score is below the least score
     without_id: int  #: boxes whose id is -1 or empty
     without_pose: int  #: boxes with no pose near enough in time
     repeated: int  #: boxes with a better one of the same object at the same pose
@@ -38,7 +38,7 @@ class Dropped:
 
     @property
     def total(self) -> int:
-        """Count the dropped boxes."""
+        """The number of all dropped boxes."""
         counted = self.below_min_score + self.without_id + self.without_pose + self.repeated
         return counted + sum(self.few_boxes.values())
 
@@ -57,7 +57,7 @@ def load_recording(
     formats: FormatNames | None = None,
     frames: FrameTimes | None = None,
 ) -> tuple[Recording, Dropped]:
-    """Read a recording in SE(3), where the robot is the camera, and what had to be left out.
+    """Read a recording in SE(3), where the robot is the camera, and the numbers of dropped boxes.
 
     Parameters
     ----------
@@ -65,27 +65,37 @@ def load_recording(
         Files in any of the formats that ``read_camera``, ``read_trajectory`` and
         ``read_detections`` know.
     min_score
-        Boxes with a lower score are left out.
+        Boxes with a lower score, 0 to 1, are left out.
     ids
-        The column of ids that are equal for boxes of the same object; "none" leaves objects open.
+        The column of ids, which are equal for boxes of the same object. With "none", boxes have no
+        object yet.
     final_ids
-        Whether these ids are final. If so, a box without an id is left out, and so are the worse
-        of two boxes with one id in an image, and ids with fewer than 3 boxes.
+        Whether these ids are final. Then three kinds of boxes are left out: those without an id,
+        the worse one of two boxes with the same id in an image, and those whose id has fewer than 3
+        boxes.
     max_time_difference
-        A box belongs to the nearest pose in time if that is within this number of seconds; by
-        default half the median interval between poses.
+        A box belongs to the nearest pose in time, if that is within this number of seconds. The
+        default is half the median interval between poses.
     odometry_noise
-        The uncertainty of one step, which trajectory files do not have.
+        The uncertainty of each step, because trajectory files have none.
     odometry_covariance
-        A file with the covariance of each step, used instead: see ``io.step_covariances``.
+        A file with the covariance of each step, which replaces ``odometry_noise``: see
+        ``io.step_covariances``.
     formats
         Names of the formats, for files that cannot be recognized.
     frames
-        Times of the frames, for files that only count them: see ``choose_frame_times``.
+        Times of the frames, for files that only number them: see ``choose_frame_times``.
+
+    Raises
+    ------
+    FileError
+        If a file is missing or wrong, or no box is left.
+    ValueError
+        If a setting is out of its range.
 
     Examples
     --------
-    Files as a robot may have them, here those of a simulated drive:
+    The files of a robot, here of a simulated drive:
 
     >>> import dqslam as dq
     >>> simulated, truth = dq.simulate(dq.load_scenario("paper"), seed=7)
@@ -155,7 +165,7 @@ def nearest_pose(
 def _undistorted(
     lens: _core.Camera, camera: str | Path, table: DetectionTable, rows: NDArray[np.int64]
 ) -> NDArray[np.float64]:
-    """Undistort boxes (m, 4), and name the line of one for which the lens has no inverse."""
+    """Undistort boxes (m, 4); an error names the line of a box where the lens has no inverse."""
     try:
         return lens.undistort_boxes(table.box[rows])
     except ValueError:
@@ -219,7 +229,7 @@ def _select_images(
     min_score: float,
     tolerance: float,
 ) -> tuple[NDArray[np.int64], Dropped]:
-    """Choose rows, in their order: all boxes of the image that is nearest in time to each pose."""
+    """Choose rows, by pose: all boxes of the image that is nearest in time to each pose."""
     scored = table.score >= min_score
     timely = scored & (late <= tolerance)
     rows = np.flatnonzero(timely)

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from dqslam.io.files import FileError
-from dqslam.io.formats import Look, Progress, tell_nobody
+from dqslam.io.formats import Look, Progress, no_progress
 
 NAME = "rosbag"
 LOOKS = "a .bag, .mcap or .db3 file, or a folder with metadata.yaml"
@@ -45,7 +45,7 @@ def looks_like_bag(look: Look) -> bool:
 
 
 def messages(
-    path: str | Path, kind: str, topic: str | None, progress: Progress = tell_nobody
+    path: str | Path, kind: str, topic: str | None, progress: Progress = no_progress
 ) -> Iterator[tuple[str, Any]]:
     """Yield the messages of one kind (``nav_msgs/msg/Odometry``) with their places, in order.
 

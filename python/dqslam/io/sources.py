@@ -1,4 +1,4 @@
-"""Settings for several files together: names of formats, and times of frames."""
+"""Settings for several files together: the names of formats and the times of frames."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from dqslam.io.trajectory import TRAJECTORY_FORMATS
 
 
 class FormatNames(NamedTuple):
-    """The format of each file, or None if it is recognized from the file."""
+    """The format of each file; None recognizes it from the file."""
 
     camera: str | None = None
     trajectory: str | None = None
@@ -37,15 +37,15 @@ KINDS = dict(
 
 
 def split_formats(names: Sequence[str]) -> FormatNames:
-    """Sort names of formats by their kind of file; ``rosbag`` is for all three kinds.
+    """Assign names of formats to the kinds of files; ``rosbag`` is a format of all three kinds.
 
     Raises
     ------
     ValueError
-        If a name is unknown, or two are of the same kind.
+        If a name is unknown, or two names are of the same kind.
     """
     chosen: dict[str, str] = {}
-    # The bag is the format of the kinds that have no other.
+    # The format rosbag is for the kinds that have no other one.
     for name in sorted(names, key=lambda name: sum(name in known for known in KINDS.values())):
         kinds = [kind for kind, known in KINDS.items() if name in known]
         if not kinds:
@@ -63,10 +63,10 @@ def choose_frame_times(
     detections: str | Path,
     formats: FormatNames = BY_LOOK,
 ) -> FrameTimes | None:
-    """Tell the times of frames for the readers of a trajectory and of boxes, where none are given.
+    """Choose the times of frames for a trajectory and boxes whose files give none.
 
-    Where the trajectory counts frames, the frame's number is its time for both. Else None: the
-    files have times of their own, or their readers say that they need them.
+    If the trajectory numbers frames, the number of a frame is its time, for both files. Otherwise
+    the result is None: the boxes have times of their own, or reading them raises an error.
     """
     path = choose_format(odometry, formats.trajectory, TRAJECTORY_FORMATS, "trajectory")
     boxes = choose_format(detections, formats.detections, DETECTION_FORMATS, "detections")
@@ -74,7 +74,13 @@ def choose_frame_times(
 
 
 def kind_of(path: str | Path) -> str | None:
-    """Recognize whether a file has a camera, a trajectory or detections; None for a bag."""
+    """Recognize whether a file has a camera, a trajectory or detections; None for a bag.
+
+    Raises
+    ------
+    FileError
+        If the file is in no known format.
+    """
     look = look_at(path)
     if looks_like_bag(look):
         return None
@@ -88,6 +94,6 @@ def kind_of(path: str | Path) -> str | None:
         if any(format_.recognize(look) for format_ in formats):
             return kind
     if look.path.is_file():
-        read_rows(path)  # names what is wrong: empty, comments only, or no text
+        read_rows(path)  # its error names the cause: empty, comments only, or no text
     known = ", ".join(dict.fromkeys(name for names in KINDS.values() for name in names))
     raise FileError(path, f"is in no known format; name it with --format: {known}")

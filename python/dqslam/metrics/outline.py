@@ -5,7 +5,8 @@ import numpy as np
 from dqslam import _core
 from dqslam._checks import Floats, Ints
 
-_AROUND = 0.5  # of the image's size: a lens is not believed further outside of the image
+# The lens model is used up to this share of the image's size outside of the image.
+_AROUND = 0.5
 
 
 def visible_outlines(
@@ -16,19 +17,21 @@ def visible_outlines(
     points: int = 128,
     lens: bool = False,
 ) -> tuple[Ints, Floats]:
-    """Return which ellipsoids the image of a pose shows, far ones first, and their outlines.
+    """Return the ellipsoids in the image of a pose, far ones first, and their outlines.
 
-    Rows (v,), and points (v, points, 2) of which the last is the first again. Whether anything
-    hides an ellipsoid is not known.
+    The result has the rows of the ellipsoids, shape (v,), and points in pixels, shape (v, points,
+    2). The last point of an outline is its first one. Occlusion is not considered.
 
     Parameters
     ----------
     world_from_camera
         Shape (7,); the camera has no mount.
     ellipsoids
-        Center and log-Cholesky shape, shape (o, 9), NaN where one is none.
+        Center and log-Cholesky shape, shape (o, 9); NaN for an object that is no ellipsoid.
     lens
-        The pixels are those of the image as recorded, else undistorted.
+        Whether pixels are those of the image as recorded; they are undistorted otherwise.
+    points
+        The number of points of an outline.
     """
     here = np.tile(world_from_camera, (len(ellipsoids), 1))
     se3 = _core.PoseModel.SE3
@@ -37,16 +40,16 @@ def visible_outlines(
         outlines = through_lens(camera, outlines)
     low, high = np.fmin.reduce(outlines, axis=1), np.fmax.reduce(outlines, axis=1)
     last = np.array([camera.width, camera.height]) - 0.5
-    rows = np.flatnonzero(np.all((high > -0.5) & (low < last), axis=1))  # not so where it is NaN
+    rows = np.flatnonzero(np.all((high > -0.5) & (low < last), axis=1))  # false for NaN
     distance = np.linalg.norm(ellipsoids[rows, :3] - world_from_camera[:3], axis=1)
     rows = rows[np.argsort(-distance, kind="stable")]
     return rows, outlines[rows]
 
 
 def through_lens(camera: _core.Camera, outlines: Floats) -> Floats:
-    """Return outlines (..., 2) in the pixels of the image as recorded, which the lens distorts.
+    """Return outlines (..., 2), undistorted pixels, in the pixels of the image as recorded.
 
-    They are NaN well outside of the image, where the polynomials of the lens are not valid.
+    Points far outside of the image are NaN, because the lens model is not valid there.
     """
     if not camera.has_distortion:
         return outlines

@@ -1,4 +1,4 @@
-"""Errors of an estimate against a simulation's truth, with objects matched by id and unaligned."""
+"""Errors of an estimate against the truth of a simulation, by object id and without alignment."""
 
 from dataclasses import dataclass
 
@@ -25,7 +25,7 @@ class Report:
     rmse_landmark: float
     """Mean distance of the mapped objects' centers from their true places, meters."""
     rmse_volume: float
-    """Mean absolute error of the mapped objects' volumes as in the paper, cubic meters."""
+    """Mean absolute error of the paper's volumes of the mapped objects, cubic meters."""
     mapped: int
     """Number of objects in the estimate."""
     not_ellipsoids: int
@@ -46,7 +46,12 @@ class Report:
 
 
 def evaluate(estimate: Estimate, truth: Truth) -> Report:
-    """Compare an estimate with the truth, object by object id, without any alignment.
+    """Compare an estimate with the truth, objects by their ids, without any alignment.
+
+    Raises
+    ------
+    ValueError
+        If an object of the estimate is not in the truth.
 
     Examples
     --------
@@ -94,8 +99,8 @@ def cube_volumes(shapes: Floats) -> Floats:
     """Return the paper's volume [m^3] of each quadric, from shapes S [m^2] of shape (o, 3, 3).
 
     It is the volume of the cube whose side is the smallest full axis, 2 sqrt(smallest eigenvalue of
-    S). A quadric that is not an ellipsoid has negative eigenvalues and no such axis. The paper
-    gives no rule for it; here it counts with the square root of the absolute value.
+    S). A quadric that is no ellipsoid has negative eigenvalues and no such axis. The paper has no
+    rule for this case; here the absolute value of the eigenvalue is used.
     """
     smallest = np.linalg.eigvalsh(shapes)[:, 0]
     return np.asarray((2.0 * np.sqrt(np.abs(smallest))) ** 3)
@@ -107,20 +112,20 @@ def ellipsoid_volumes(shapes: Floats) -> Floats:
 
 
 def box_volumes(shapes: Floats) -> Floats:
-    """Return the volume [m^3] of the upright box-shaped object that each ellipsoid was fitted to.
+    """Return the volume [m^3] of the upright box-shaped object of each ellipsoid.
 
     Shapes S [m^2] have shape (o, 3, 3), and the z axis of the world is up. An upright box with
     ground l x w, seen from all around, has a mean half width of (l + w) / pi. The ellipsoid with
-    the same outlines has this half width too. For l = w its horizontal semi-axes are so 4 / pi
-    times the half sides, and otherwise this is nearly true of their geometric mean. Its height is
-    that of the box, 2 sqrt(S_zz).
+    the same outlines has this half width too. Therefore, its horizontal semi-axes are 4 / pi times
+    the half sides for l = w. Otherwise this holds approximately for the geometric means. The height
+    of the ellipsoid is that of the box, 2 sqrt(S_zz).
     """
     across = np.sqrt(np.linalg.det(shapes[:, :2, :2]))  # product of the ground's semi-axes
     return np.asarray(8.0 * (np.pi / 4.0) ** 2 * across * np.sqrt(shapes[:, 2, 2]))
 
 
 def true_rows(object_ids: Ints, truth: Truth) -> Ints:
-    """Return the row in the truth of each mapped object."""
+    """Return the row in the truth of each mapped object, shape (o,)."""
     row_of = {int(object_id): row for row, object_id in enumerate(truth.object_id)}
     unknown = [int(object_id) for object_id in object_ids if int(object_id) not in row_of]
     if unknown:

@@ -1,4 +1,4 @@
-"""Maps of sessions as files: what ``save_estimate`` writes, read back with its uncertainty."""
+"""Maps of sessions as files of ``save_estimate``, and their covariances."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from dqslam.online.readout import read_estimate
 from dqslam.online.state import State
 from dqslam.recording import tangent_size
 
-# Sigmas of the center [m] and of the log axes, where a result has none: well measured, not exact.
+# Sigmas of the center [m] and of the log axes if a result has none, as for a well measured object.
 UNKNOWN_CENTER_SIGMA_M, UNKNOWN_LOG_SIGMA = 0.05, 0.1
-# The sigma of an orientation [rad] where axes are equal, which leaves it open.
+# The sigma of an orientation [rad] if axes are equal, which do not determine it.
 MAX_ANGLE_SIGMA = 0.5
 
 
 @dataclass(frozen=True, eq=False)
 class KnownMap:
-    """Objects that a session begins with."""
+    """The objects of a loaded map."""
 
     camera: _core.Camera
     object_ids: list[ObjectId]
@@ -32,7 +32,7 @@ class KnownMap:
     ellipsoids: Floats
     """Shape (o, 9)."""
     covariances: Floats
-    """Of these, shape (o, 9, 9)."""
+    """Covariances of the ellipsoids, shape (o, 9, 9)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,17 +42,17 @@ class _Covariances:
 
 
 def load_map(directory: str | Path, robot_from_camera: ArrayLike | None = None) -> KnownMap:
-    """Read the objects of a result that are ellipsoids, and how uncertain they are.
+    """Read the ellipsoids of a result, and their covariances.
 
-    A result has the covariance of the center and the sigmas of the log semi-axes; the orientation
-    is taken to be known as well as the axes differ. It does not have where the camera is on the
-    robot: by default, robot and camera are the same.
+    A result has the covariance of the center and the sigmas of the log semi-axes. The uncertainty
+    of the orientation follows from these and the ratios of the axes. A result does not have the
+    mount of the camera, which is the identity by default.
     """
     results = load_results(directory)
     objects = results.objects
     rows = np.flatnonzero(objects.is_ellipsoid)
     if not rows.size:
-        raise FileError(Path(directory) / "map.json", "has no ellipsoid to find the way by")
+        raise FileError(Path(directory) / "map.json", "has no ellipsoid")
     covariances = np.zeros((len(rows), 9, 9))
     for covariance, row in zip(covariances, rows, strict=True):
         center, sigma = objects.center_covariances[row], objects.log_semi_axes_sigmas[row]
@@ -76,9 +76,9 @@ def load_map(directory: str | Path, robot_from_camera: ArrayLike | None = None) 
 def _shape_covariance(semi_axes: Floats, orientation_xyzw: Floats, log_sigma: Floats) -> Floats:
     """Return the covariance of the log-Cholesky shape, (6, 6).
 
-    Of six independent changes, the logarithms of the axes and the angles between them: turning by
-    an angle a in the plane of axes i and j changes log S by (log s_i - log s_j) a. Angles have the
-    sigma at which that equals the larger of the two log sigmas.
+    It is that of six independent changes: of the logarithms of the axes, and of the angles between
+    them. A rotation by an angle a in the plane of axes i and j changes log S by
+    (log s_i - log s_j) a. The sigma of an angle makes this change equal to the larger log sigma.
     """
     logs = np.log(semi_axes)
     apart = np.abs(np.roll(logs, -1) - np.roll(logs, -2)) + 1e-3
@@ -117,7 +117,7 @@ def add_map(state: State, known: KnownMap) -> None:
 def object_covariances(state: State) -> dict[ObjectRow, Floats]:
     """Return the covariance (9, 9) of each object of a session that has one.
 
-    Of a continued map these are what it was loaded with: the problem does not have its priors.
+    For a continued map, they are the loaded ones, because the problem does not have its priors.
     """
     core, known = state.core, state.store.map_covariance
     if core.num_poses == 0 or known:

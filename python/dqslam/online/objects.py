@@ -1,4 +1,4 @@
-"""The objects of a session as users see them, and which row of the session has which id."""
+"""The objects of a session for users, and the ids of the session's rows."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from dqslam._ids import ObjectId, ObjectRow
 
 @dataclass(frozen=True, eq=False)
 class Objects:
-    """The map as it stands."""
+    """The objects of a session, as estimated now."""
 
     object_ids: Ints
-    """In the order in which they were seen first, shape (o,)."""
+    """Ids in the order in which objects were first observed, shape (o,)."""
     class_names: tuple[str, ...]
-    """One per object: the class most of its boxes have."""
+    """The class of most boxes of each object."""
     observations: Ints
-    """Boxes per object in this session, shape (o,)."""
+    """Number of boxes of each object in this session, shape (o,)."""
     ellipsoids: Floats
     """Center and log-Cholesky shape, shape (o, 9)."""
 
@@ -32,7 +32,7 @@ class Objects:
 
     @property
     def centers(self) -> Floats:
-        """In the world, meters, shape (o, 3)."""
+        """Centers in the world, meters, shape (o, 3)."""
         return self.ellipsoids[:, :3]
 
     @property
@@ -43,24 +43,24 @@ class Objects:
 
 
 ANY_ID = ObjectId(-1)
-"""Stands for an id that no object has."""
+"""Replaced by an id that no object has."""
 
 
 class Registry:
-    """Ids of the session's objects by row, and what boxes with final ids called them."""
+    """Ids of the session's objects by row, and the classes of their boxes with final ids."""
 
     def __init__(self, ids: Iterable[ObjectId] = ()) -> None:
         """Begin with some objects."""
         self.ids: list[ObjectId] = []
         self.row_of: dict[ObjectId, ObjectRow] = {}
         self.votes: list[Counter[str]] = []
-        """How often boxes that came with its id called an object what, by row."""
+        """Numbers of an object's boxes with final ids by class, by row of the object."""
         self.register(ids)
 
     def rows_of(self, ids: Sequence[ObjectId]) -> tuple[list[ObjectRow], list[int]]:
-        """Return the rows of ids, and the first place in ``ids`` of those that are new.
+        """Return the rows of ids, and the first places in ``ids`` of new ids.
 
-        New ones are to be registered in this order.
+        New ids must be registered in this order.
         """
         new: dict[ObjectId, ObjectRow] = {}
         first = []

@@ -1,4 +1,4 @@
-"""A full solve of a session, here or in the background, and its merge into what came since."""
+"""A full solve of a session, now or in the background, and the merge of its result."""
 
 from __future__ import annotations
 
@@ -12,51 +12,51 @@ import numpy as np
 from dqslam import _core
 from dqslam._checks import Floats
 
-# Of the session's own minimization, which stops where the cost does.
+# The most iterations of the session's own minimization, which stops when the cost does.
 MAX_SMOOTHING_ITERATIONS = 50
 
 
 @dataclass(frozen=True, eq=False)
 class Polished:
-    """What a full solve found of the session as it was when it began."""
+    """The result of a full solve, for the session at the time when the solve began."""
 
     poses: Floats
-    """Shape (n, d); empty where there was nothing to do."""
+    """Shape (n, d); empty if nothing was done."""
     num_objects: int
-    """How many objects the session had."""
+    """Number of objects of the session."""
     object_rows: list[int]
-    """Rows of those that the solve moved."""
+    """Rows of the objects that the solve moved."""
     ellipsoids: Floats
-    """Of these, center and log-Cholesky shape, shape (len(object_rows), 9)."""
+    """Their centers and log-Cholesky shapes, shape (len(object_rows), 9)."""
     cost: float
-    """Half the sum of squared residuals, in sigmas, after the loss; NaN where nothing was done."""
+    """Half the sum of squared residuals, in sigmas, after the loss; NaN if nothing was done."""
     summary: _core.Summary | None
-    """None where a map was continued, or nothing was done."""
+    """None if a map was continued, or nothing was done."""
 
     @classmethod
     def of(cls, solution: _core.Solution, num_objects: int, rows: list[int]) -> Polished:
-        """Take what the core found of a session with so many objects, of some of their rows."""
+        """Make the result from a solution of the core, for these rows of the session's objects."""
         summary = solution.summary
         cost = summary.final_cost
         return cls(solution.poses, num_objects, rows, solution.landmarks, cost, summary)
 
 
 NOTHING = Polished(np.zeros((0, 0)), 0, [], np.zeros((0, 9)), np.nan, None)
-"""What is found where there is nothing to do."""
+"""The result if there is nothing to do."""
 
 
 @dataclass(frozen=True, eq=False)
 class Polish:
-    """A solve of what a session had when the polish was made."""
+    """A solve of the session at the time when the polish was made."""
 
     work: Callable[[], Polished]
-    """Solves; touches nothing but a copy of the session."""
+    """Solves, and changes only a copy of the session."""
     merge: Callable[[Polished], None]
-    """Takes over what was found: what arrived meanwhile moves along."""
+    """Merges the result into the session; later poses and objects move with it."""
 
 
 def solve_all(core: _core.Session, options: _core.SolveOptions) -> Polish:
-    """Make a polish of the problem as ``solve`` has it, from where the session stands."""
+    """Make a polish that solves the problem, starting from the state of the session."""
     num_objects = core.num_objects
     graph, rows = core.to_graph()
     start = _core.State(core.poses, core.ellipsoids[rows])
@@ -72,8 +72,8 @@ def solve_all(core: _core.Session, options: _core.SolveOptions) -> Polish:
 def smooth_all(core: _core.Session) -> Polish:
     """Make a polish of all poses of a session that continues a map.
 
-    The map's objects are Gaussian priors, which ``solve`` has not; the session's own minimization
-    has them.
+    The objects of the map are Gaussian priors. ``solve`` does not have such priors, but the
+    session's own minimization has.
     """
     smoothed = core.clone()
 
@@ -86,7 +86,7 @@ def smooth_all(core: _core.Session) -> Polish:
 
 
 def _move(core: _core.Session, found: Polished) -> None:
-    """Move the poses and objects that there were to where they were found."""
+    """Set the poses and objects of a solve to its result."""
     if len(found.poses):
         ellipsoids = core.ellipsoids[: found.num_objects]
         ellipsoids[found.object_rows] = found.ellipsoids
@@ -97,7 +97,7 @@ class Polisher:
     """Runs one polish at a time."""
 
     def __init__(self) -> None:
-        """Begin without one."""
+        """Begin without a polish."""
         self._polish: Polish | None = None
         self._found: Future[Polished] = Future()
 
@@ -109,7 +109,7 @@ class Polisher:
         def run() -> None:
             try:
                 found.set_result(polish.work())
-            except BaseException as error:  # whoever asks for the result gets it
+            except BaseException as error:  # raised by result()
                 found.set_exception(error)
 
         if background:
@@ -120,7 +120,7 @@ class Polisher:
         return found
 
     def take(self, *, wait: bool = False) -> None:
-        """Merge what the last polish has found, if it is done."""
+        """Merge the result of the last polish, if it is done."""
         polish = self._polish
         if polish is None or not (wait or self._found.done()):
             return

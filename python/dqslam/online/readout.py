@@ -1,4 +1,4 @@
-"""What a session knows, read out: its objects, what boxes show, the whole estimate."""
+"""The results of a session: its objects, the objects of its boxes, and its estimate."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def read_objects(state: State) -> Objects:
 
 
 def read_assignments(state: State) -> list[Ints]:
-    """Return the ids that the boxes of each step show, as far as is known now; -1 for none."""
+    """Return the ids of the objects that the boxes of each step show, as known now; -1 for none."""
     ids = np.array([*state.registry.ids, -1], dtype=np.int64)
     store, labels = state.store, state.store.labels
     assignments = list(state.given_ids)
@@ -38,7 +38,7 @@ def read_assignments(state: State) -> list[Ints]:
 
 
 def read_estimate(state: State) -> Estimate:
-    """Return all of it as ``solve`` does, objects by ascending ids."""
+    """Return the estimate in the form of ``solve``, with objects by ascending ids."""
     objects = read_objects(state)
     order = np.argsort(objects.object_ids, kind="stable")
     graph, _ = state.core.to_graph()

@@ -1,4 +1,4 @@
-"""Where the robot is in a known map, from a few boxes."""
+"""The pose of the robot in a known map, from a few boxes."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from dqslam.online.readout import read_objects
 from dqslam.online.state import State
 from dqslam.online.step import StepBoxes
 
-# Boxes that are needed: as many as determine the pose where their objects are known ...
+# The least number of boxes. With ids, it is the number that determines the pose.
 MIN_BOXES_WITH_IDS = {_core.PoseModel.SE2: 2, _core.PoseModel.SE3: 3}
-# ... and more where only classes are, for other objects of these may fit by chance.
+# With classes alone it is larger, because other objects of a class may fit by chance.
 MIN_BOXES_WITHOUT_IDS = 4
-# A place is ambiguous if another's chi-square is no more than this above: 20 to 1 (2 ln 20).
+# A pose is ambiguous if the chi-square of another exceeds its own by less than this (2 ln 20).
 MIN_CHI2_MARGIN = 6.0
-# Where the covariance of an object is unknown, m^2 and log meters: a centimeter or so.
+# Covariance of an object if it is unknown, m^2 and log meters: about a centimeter.
 _UNKNOWN_COVARIANCE = np.diag([1e-4] * 3 + [1e-3] * 3 + [1e-4] * 3)
 
 
@@ -31,14 +31,14 @@ class Relocation:
     pose: Floats
     """world_from_robot, shape (d,)."""
     covariance: Floats
-    """In the tangent of the pose, translation first, the map's errors included; shape (k, k)."""
+    """Covariance in the tangent of the pose, with the errors of the map; shape (k, k)."""
     object_id: Ints
-    """Which object each box shows, -1 for none; shape (b,)."""
+    """Id of the object that each box shows, -1 for none; shape (b,)."""
     chi_square: float
-    """Of the boxes that show one, 4 degrees of freedom each."""
+    """Sum over the boxes that show an object, with 4 degrees of freedom each."""
 
     def with_ids(self, boxes: StepBoxes) -> StepBoxes:
-        """Return the boxes that show objects of the map, with these objects' ids."""
+        """Return the boxes that show objects of the map, with the ids of these objects."""
         known = np.flatnonzero(self.object_id >= 0)
         some = check_boxes(replace(boxes, object_id=self.object_id)).select(known)
         return StepBoxes(some.box, some.object_id, some.class_name, some.truncated)

@@ -1,4 +1,4 @@
-"""A recording step by step, as it would have arrived."""
+"""A recording as steps in the order of time."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from dqslam.recording import Measurements, Recording, RelativePositions
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """How a step went."""
+    """A step of a replay, its report, and its time."""
 
     step: Step
     report: _core.StepReport
     milliseconds: float
-    """Wall clock of ``add``."""
+    """Wall-clock time of ``add``."""
 
 
 def steps_of(recording: Recording) -> Iterator[Step]:
-    """Go through a recording in the order of time."""
+    """Yield the steps of a recording in the order of time."""
     odometry, detections = recording.odometry, recording.detections
     count = len(recording.timestamps)
     order = np.argsort(detections.pose, kind="stable")
@@ -67,7 +67,7 @@ def _measurements_at(measurements: Iterable[Measurements], pose: int) -> list[St
 
 
 def replay(slam: OnlineSlam, recording: Recording) -> Iterator[Frame]:
-    """Feed a recording to a session, and yield how each step went."""
+    """Add the steps of a recording to a session, and yield the report and time of each."""
     for step in steps_of(recording):
         start = perf_counter()
         report = slam.add(

@@ -34,34 +34,34 @@ from dqslam.recording import pose_model_of, pose_size
 class OnlineSlam:
     """Object SLAM step by step.
 
-    Each ``add`` does bounded work and leaves an estimate that can be used: ``pose``, ``poses``,
-    ``objects``. Objects have a size prior from their first box, so no state is ever indeterminate.
+    Each ``add`` does bounded work. After it, ``pose``, ``poses`` and ``objects`` have an estimate.
+    Objects have a size prior from their first box, so the estimate is always determined.
 
     Parameters
     ----------
     camera
-        Of undistorted boxes, and where it is on the robot.
+        The camera of undistorted boxes, and its mount on the robot.
     options
-        Of the solver: its loss is that of ``polish``, and any but ``NONE`` makes the steps robust.
+        Options of the solver for ``polish``. With any loss but ``NONE``, steps are robust too.
     online
-        Of the steps: how many poses are minimized, and when.
+        Options of the steps: how many poses are minimized, and when.
     pose_model
-        SE2 or SE3; by default that of ``first_pose``, and without one that of the first motion:
-        until then the plane is assumed.
+        SE2 or SE3. The default is that of ``first_pose``, or else that of the first motion; until
+        then it is SE2.
     first_pose, first_covariance
-        world_from_robot of the first step, the origin by default, and its covariance (k, k), by
-        default none: it is exact.
+        world_from_robot of the first step, by default the origin, and its covariance (k, k).
+        Without a covariance, the first pose is exact.
     box_noise, size_prior, scene_priors
-        What is assumed, as ``build_graph`` has it.
+        Assumptions, as for ``build_graph``.
     trust_ids
-        The probability that an id stays with its object; 1 takes ids for final. Below, and for
-        boxes without ids, boxes find their objects as ``associate`` has it.
+        The probability that an id stays with its object; with 1, ids are final. With less, and for
+        boxes without ids, boxes are assigned to objects as in ``associate``.
     finds_movers
-        Whether objects whose ids are final must show that they are at rest, too: their boxes wait
-        for four views, and objects that move are left out.
+        Whether objects with final ids are tested for motion as well. Their boxes wait for four
+        views, and objects that move are left out.
     estimates_noise
-        Whether the level of the odometry's noise is estimated from such boxes, and the covariances
-        of the steps are not believed.
+        Whether the level of the odometry's noise is estimated from such boxes, instead of using the
+        covariances of the steps.
 
     Examples
     --------
@@ -92,7 +92,7 @@ class OnlineSlam:
         finds_movers: bool = False,
         estimates_noise: bool = False,
     ) -> None:
-        """Begin a session without a step."""
+        """Begin a session that has no step yet."""
         self._arguments = {name: value for name, value in locals().items() if name != "self"}
         require(camera, _core.Camera, "OnlineSlam", "OnlineSlam(recording.camera)")
         if not 0.5 < trust_ids <= FINAL:
@@ -143,25 +143,25 @@ class OnlineSlam:
         positions: StepPositions | None = None,
         measurements: Sequence[StepMeasurements] = (),
     ) -> _core.StepReport:
-        """Add a step and bring the estimate up to date.
+        """Add a step and update the estimate.
 
         Parameters
         ----------
         odometry
-            None for the first step only.
+            The motion since the step before; None for the first step only.
         boxes
-            None or empty for a step that saw nothing. Boxes of object -1 are given to the object
-            that they clearly show, or to a new one once a few of them follow each other.
+            None or empty for a step without boxes. A box of object -1 is assigned to the object
+            that it clearly shows, or to a new one when enough of them agree.
         timestamp
-            Seconds, after that of the step before; by default one second later.
+            Seconds, later than the step before; by default one second later.
         positions, measurements
-            What else was measured of objects that boxes have shown.
+            Other measurements of objects that boxes have shown.
 
         Raises
         ------
         StepError
-            For a time that does not increase, a step without odometry, numbers that are not finite
-            and boxes that are none. Nothing has changed then.
+            If the time does not increase, if odometry is missing, if numbers are not finite, or if
+            a box is invalid. The session is then unchanged.
         """
         for given, kind in ((odometry, Motion), (boxes, StepBoxes), (positions, StepPositions)):
             if given is not None:
@@ -177,7 +177,7 @@ class OnlineSlam:
         )
 
     def _settle_pose_model(self, odometry: Motion) -> None:
-        """Begin again in space if that is where the first motion is."""
+        """Begin again in SE(3) if the first motion is in SE(3)."""
         self._may_leave_plane = False
         if np.shape(odometry.relative) == (pose_size(_core.PoseModel.SE3),):
             space = OnlineSlam(**self._arguments | {"pose_model": _core.PoseModel.SE3})
@@ -209,7 +209,7 @@ class OnlineSlam:
 
     @property
     def pose(self) -> Floats:
-        """world_from_robot now, shape (d,); the first pose before any step."""
+        """world_from_robot of the last step, shape (d,); the first pose before any step."""
         if not len(self):
             return self._state.begin[0]
         return np.asarray(self._state.core.pose_at(len(self) - 1))
@@ -221,54 +221,54 @@ class OnlineSlam:
 
     @property
     def objects(self) -> Objects:
-        """The objects as they stand."""
+        """The present estimate of the objects."""
         return read_objects(self._state)
 
     @property
     def num_objects(self) -> int:
-        """How many objects there are."""
+        """The number of objects."""
         return len(self._state.object_rows)
 
     @property
     def left_out(self) -> dict[int, str]:
-        """Ids of objects that do not fit a world at rest, and why; their boxes take no part."""
+        """Reasons why objects do not fit a world at rest, by id; their boxes are not used."""
         return self._state.left_out
 
     @property
     def shown(self) -> Ints:
-        """Object that each box of the last step shows, -1 for one that waits; shape (b,)."""
+        """Id of the object that each box of the last step shows, -1 if it waits; shape (b,)."""
         return self._state.shown
 
     @property
     def assignments(self) -> list[Ints]:
-        """Which object each box of each step shows, as far as is known now; -1 for none."""
+        """Id of the object that each box of each step shows, as known now; -1 for none."""
         return read_assignments(self._state)
 
     @property
     def keyframes(self) -> Ints:
-        """Steps whose boxes take part, of boxes that are identified; shape (f,)."""
+        """Steps that are keyframes of the association, shape (f,)."""
         return np.array([one.pose for one in self._state.store.keyframes], dtype=np.int64)
 
     @property
     def size_prior(self) -> SizePrior | SizePriors:
-        """What is assumed of new objects: given, or learned from those that were found."""
+        """The size prior of new objects, which is given or learned from earlier objects."""
         return self._state.store.size_prior or self._state.prior
 
     @property
     def odometry_noise(self) -> OdometryNoise | None:
-        """Of a step, where that is estimated."""
+        """The estimated noise of a step; None if it is not estimated."""
         return self._state.odometry_noise
 
     def estimate(self) -> Estimate:
-        """Return all of it as ``solve`` does, objects by ascending ids."""
+        """Return the estimate in the form of ``solve``, with objects by ascending ids."""
         return read_estimate(self._state)
 
     def polish(self, *, background: bool = False) -> Future[Polished]:
-        """Minimize all that has arrived, as ``solve`` does, from where the session stands.
+        """Solve the complete problem, starting from the state of the session.
 
-        In the background, the result is merged at the first ``add`` after it is done: what arrived
-        meanwhile moves along rigidly. ``result()`` of what is returned waits for it. Without steps
-        or boxes there is nothing to do.
+        In the background, the result is merged at the first ``add`` after it is done. Poses that
+        arrived in the meantime move rigidly with it. ``result()`` of the returned future waits for
+        the result. Without steps or boxes, nothing is done.
         """
         self._polisher.take(wait=True)
         state = self._state
@@ -283,12 +283,12 @@ class OnlineSlam:
     # ------------------------------------------------------------------------------ maps
 
     def relocalize(self, boxes: StepBoxes) -> Relocation:
-        """Find the pose from which boxes of known objects, or classes, were seen.
+        """Find the pose from which boxes of mapped objects were seen, by their ids or classes.
 
         Raises
         ------
         ValueError
-            With too few boxes of the map, when no pose explains them, or when two do.
+            If there are too few boxes of mapped objects, or if not exactly one pose explains them.
         """
         return relocalize(self._state, boxes)
 
@@ -306,23 +306,23 @@ class OnlineSlam:
         first_boxes: StepBoxes | None = None,
         **settings: Any,
     ) -> Self:
-        """Continue a map that was saved: its objects, with their covariances, are what is known.
+        """Continue a saved map: its objects and their covariances are priors of the new session.
 
         Parameters
         ----------
         robot_from_camera
-            Where the camera is on the robot, which no result has; by default they are the same.
+            Mount of the camera, which results do not have; by default the identity.
         first_boxes
-            The first step. Without a ``first_pose``, the session begins where they are seen from.
+            Boxes of the first step. Without a ``first_pose``, they determine the first pose.
         settings
-            As those of a new session.
+            Further arguments of a new session.
 
         Raises
         ------
         FileError
-            For results that are missing or wrong.
+            If results are missing or wrong.
         ValueError
-            When no pose explains the boxes, or two do.
+            If not exactly one pose explains the boxes.
         """
         known = load_map(directory, robot_from_camera)
         slam = cls(known.camera, options, **settings)
@@ -338,7 +338,7 @@ class OnlineSlam:
 
 
 def _with_loss(online: _core.OnlineOptions, loss_scale: float) -> _core.OnlineOptions:
-    """Return the same options with a loss on boxes."""
+    """Return the options with another scale of the loss on boxes."""
     names = [name for name in dir(online) if not name.startswith("_")]
     return _core.OnlineOptions(
         **{name: getattr(online, name) for name in names} | {"loss_scale": loss_scale}

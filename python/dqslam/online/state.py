@@ -1,4 +1,4 @@
-"""What a session takes for granted and what it knows: the data that its modules share."""
+"""The settings and the state of a session, which its modules share."""
 
 from __future__ import annotations
 
@@ -17,43 +17,43 @@ from dqslam.online.objects import Registry
 
 @dataclass(frozen=True, eq=False)
 class Settings:
-    """What a session takes for granted."""
+    """The settings of a session."""
 
     camera: _core.Camera
     pose_model: _core.PoseModel
     solve_options: _core.SolveOptions
     box_noise: BoxNoise
     size_prior: SizePrior | SizePriors | None
-    """Of new objects; None where it is learned from those that are found."""
+    """Size prior of new objects; None if it is learned from earlier objects."""
     believes_ids: bool
-    """Whether a box with an id shows that object, without being identified."""
+    """Whether a box with an id shows that object, without a test."""
     trust: float
-    """The probability that an id stays with its object, of boxes that are identified."""
+    """The probability that an id stays with its object, for boxes that are tested."""
     estimates_noise: bool
     """Whether the level of the odometry's noise is estimated from boxes."""
 
 
 @dataclass(eq=False)
 class State:
-    """What a session knows."""
+    """The state of a session."""
 
     settings: Settings
     begin: tuple[Floats, Floats]
-    """First pose and its covariance, as ``path_begin`` has them."""
+    """First pose and its covariance, see ``path_begin``."""
     core: _core.Session
     """All poses and boxes, and the estimate."""
     registry: Registry
-    """Which id each object of the core has."""
+    """The id of each object of the core."""
     store: KeyframeStore
-    """Which object each box shows, of those that are identified."""
+    """The object that each box shows, for boxes that are tested."""
     timestamps: list[float] = field(default_factory=list)
     given_ids: list[Ints] = field(default_factory=list)
-    """Ids that the boxes of each step came with, -1 for none."""
+    """Given ids of the boxes of each step, -1 for none."""
     shown: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     """Ids of the objects that the boxes of the last step show, -1 for one that waits."""
 
     def copy(self) -> State:
-        """Return a state to be changed by itself; its steps are those of this one."""
+        """Return a copy that can be changed independently; it shares the lists of steps."""
         store = copy.copy(self.store)
         store.labels = store.labels.since(0)  # a step may add boxes to the others meanwhile
         return replace(
@@ -62,22 +62,22 @@ class State:
 
     @property
     def prior(self) -> SizePrior | SizePriors:
-        """The size prior of objects that come with their ids."""
+        """The size prior of objects whose ids are given."""
         return self.settings.size_prior or SizePrior()
 
     @property
     def odometry_noise(self) -> OdometryNoise | None:
-        """Of a step, where that is estimated."""
+        """The estimated noise of a step; None if it is not estimated."""
         return self.store.odometry_noise if self.settings.estimates_noise else None
 
     @property
     def left_out(self) -> dict[int, str]:
-        """Ids of objects that do not fit a world at rest, and why."""
+        """Reasons why objects do not fit a world at rest, by id."""
         return {self.registry.ids[row]: why for row, why in self.store.labels.left_out.items()}
 
     @property
     def object_rows(self) -> list[ObjectRow]:
-        """Rows of the objects that are in the map: not left out, and called something by a box."""
+        """Rows of the objects in the map, which are not left out and have a box with a class."""
         left_out, labels = self.store.labels.left_out, self.store.labels
         named = labels.box_counts
         votes = self.registry.votes

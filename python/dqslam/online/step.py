@@ -1,4 +1,4 @@
-"""What arrives at one step."""
+"""The input of one step."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from numpy.typing import ArrayLike
 
 
 class StepError(ValueError):
-    """A step was refused and changed nothing; the session goes on with the next."""
+    """A step is wrong. The session is unchanged and can continue with the next step."""
 
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """From the pose before to this one, as odometry measured it."""
+    """The motion from the pose before to this one, as odometry measured it."""
 
     relative: ArrayLike
     """next_in_previous, shape (d,)."""
     covariance: ArrayLike
-    """In the tangent at ``relative``, translation [m] first, then rotation [rad]; (k, k)."""
+    """Covariance in the tangent at ``relative``, translation [m], then rotation [rad]; (k, k)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,16 +29,16 @@ class StepBoxes:
     box: ArrayLike
     """[u_min, v_min, u_max, v_max] in undistorted pixels, shape (b, 4)."""
     object_id: ArrayLike
-    """Which object each shows, -1 where that is unknown; shape (b,)."""
+    """Id of the object that each box shows, -1 if unknown; shape (b,)."""
     class_name: Sequence[str] = ()
-    """Of each box; "object" by default."""
+    """Class of each box; "object" by default."""
     truncated: ArrayLike | None = None
-    """Which edges are the border of the image, which the object leaves; (b, 4), none by default."""
+    """Whether each edge is cut by the image border, shape (b, 4); by default none is."""
 
 
 @dataclass(frozen=True, eq=False)
 class StepPositions:
-    """Measured centers of objects that boxes have shown, as a depth camera gives them."""
+    """Measured centers of objects that boxes have shown, for example from a depth camera."""
 
     object_id: ArrayLike
     """Shape (p,)."""
@@ -50,7 +50,7 @@ class StepPositions:
 
 @dataclass(frozen=True, eq=False)
 class StepMeasurements:
-    """Other measurements of objects that boxes have shown, of one kind of the core."""
+    """Measurements of one kind, of objects that boxes have shown."""
 
     kind: str
     """"range", or another kind with m numbers each."""
@@ -64,7 +64,7 @@ class StepMeasurements:
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """All that arrives at one time."""
+    """The input of one step at a time."""
 
     timestamp: float
     """Seconds."""

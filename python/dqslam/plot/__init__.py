@@ -1,4 +1,4 @@
-"""Figures. Nothing here computes results; the numbers come from the layers below."""
+"""Figures. Their numbers come from the layers below; nothing is computed here."""
 
 from dqslam.plot.maps import plot_maps as plot_maps
 from dqslam.plot.results import Drawn as Drawn

@@ -18,7 +18,7 @@ _WORST_SHOWN = 100.0  # the largest error over bound that has a color of its own
 
 
 def plot_ablation(table: AblationTable, path: str | Path) -> None:
-    """Draw the clean variants as two maps of numbers, and the robust back ends below."""
+    """Draw the variants with right ids as two tables, and below the losses with wrong ids."""
     figure = new_figure(11.0, 6.6)
     grid = figure.add_gridspec(2, 2)
     clean = [row for row in table.rows if row.variant.wrong_ids is None]
@@ -43,7 +43,7 @@ def plot_ablation(table: AblationTable, path: str | Path) -> None:
 
 
 def label(name: str) -> str:
-    """Return a member of an option's enum in words."""
+    """Return the name of an option's value in words."""
     words = name.lower().replace("_", " ").replace("then", "→")
     for lower in ("svd", "dcs", "gnc tls", "gnc gm"):
         words = words.replace(lower, lower.upper())
@@ -59,7 +59,7 @@ def _draw_map(
     limits: tuple[float, float],
     colors: str,
 ) -> None:
-    """Write a number for each residual, down, and schedule and start, across."""
+    """Draw a table of numbers with a row per residual and a column per schedule and start."""
     from matplotlib.colors import LogNorm, Normalize
 
     down = list(dict.fromkeys(row.variant.residual for row in rows))
@@ -87,10 +87,7 @@ def _draw_back_ends(axes: "Axes", table: AblationTable) -> None:
     names: list[str] = []
     for side, kind in zip((-0.12, 0.12), WRONG_KINDS, strict=True):
         rows = [row for row in table.rows if row.variant.wrong_ids == kind]
-        names = [
-            "told the\nright ids" if row.variant.told else label(row.variant.loss.name)
-            for row in rows
-        ]
+        names = ["oracle" if row.variant.oracle else label(row.variant.loss.name) for row in rows]
         ratio = np.array([row.error_over_bound for row in rows])
         color, marker = _KIND_STYLES[kind]
         place = np.arange(len(rows)) + side
@@ -113,6 +110,6 @@ def _draw_back_ends(axes: "Axes", table: AblationTable) -> None:
     axes.set_xticks(range(len(names)), names, fontsize=9)
     axes.set_xlim(-0.6, len(names) - 0.4)
     axes.set_ylabel("mean error / bound")
-    axes.set_title(f"robust back ends, {WRONG_SHARE:.0%} of the boxes with a wrong id", fontsize=10)
+    axes.set_title(f"robust losses, {WRONG_SHARE:.0%} of the boxes with a wrong id", fontsize=10)
     axes.grid(alpha=0.25, linewidth=0.5, axis="y")
     axes.legend(frameon=False, fontsize=9, loc="upper right")

@@ -1,4 +1,4 @@
-"""The view from above: any world on paper, with its longer side across."""
+"""The view from above of any world, with the longer side of the path across the figure."""
 
 from dataclasses import dataclass
 
@@ -16,29 +16,35 @@ class FromAbove:
     """A projection along the vertical."""
 
     axes: Floats
-    """The directions in the world that point to the right and up on the paper, shape (2, 3)."""
+    """Directions in the world that point right and up in the figure, shape (2, 3)."""
     labels: tuple[str, str]
-    """Labels of both axes."""
+    """Labels of the horizontal and the vertical axis of the figure."""
     downward: bool
-    """Whether the second axis runs down the paper, so that its numbers are those of the world."""
+    """Whether the figure's vertical axis must be inverted to have the numbers of the world."""
 
     def points(self, points: Floats) -> Floats:
-        """Return the places (n, 2) of points (n, 3) on the paper."""
+        """Return the places (n, 2) of points (n, 3) in the figure, meters."""
         return np.asarray(points @ self.axes.T)
 
     def outline(self, center: Floats, shape: Floats) -> Floats:
-        """Return the outline from above, (2, n), of an ellipsoid of a shape [m^2], (3, 3)."""
+        """Return the outline (2, n) of an ellipsoid with center (3,) [m], shape (3, 3) [m^2]."""
         return outline(self.axes @ center, self.axes @ shape @ self.axes.T)
 
 
 def outline(center: Floats, shape: Floats) -> Floats:
-    """Return the outline (2, n) of an ellipse of center (2,) and shape (2, 2), perhaps flat."""
+    """Return the outline (2, n) of an ellipse with a center (2,) and a shape (2, 2).
+
+    The shape may be singular.
+    """
     squares, along = np.linalg.eigh(shape)
     return np.asarray(center[:, None] + along * np.sqrt(squares.clip(min=0.0)) @ CIRCLE)
 
 
 def from_above(world_from_camera: Floats) -> FromAbove:
-    """Choose the view of a path (n, 7), with an axis of the world across if one is vertical."""
+    """Choose the view of a path (n, 7).
+
+    If an axis of the world is vertical, the axes of the figure are the other two.
+    """
     up = up_direction(world_from_camera)
     vertical = int(np.argmax(np.abs(up)))
     if np.abs(up[vertical]) == 1.0:
@@ -52,6 +58,6 @@ def from_above(world_from_camera: Floats) -> FromAbove:
         axes, labels = np.stack([across, np.cross(up, across)]), ("across", "along")
     spread = np.ptp(world_from_camera[:, :3] @ axes.T, axis=0)
     turned = bool(spread[1] > spread[0])
-    if turned:  # a quarter turn of the paper to the right
+    if turned:  # rotates the view by a quarter turn to the right
         axes, labels = axes[::-1].copy(), (labels[1], labels[0])
     return FromAbove(axes, (f"{labels[0]} [m]", f"{labels[1]} [m]"), downward=turned)

@@ -26,7 +26,7 @@ _TALLEST = 3.0  # largest height of an image, inches
 
 
 def draw_worst_and_median(results: Results, fits: BoxFits) -> "Figure":
-    """Draw the frame whose boxes overlap least with their objects on average, and the median one.
+    """Draw the frame with the least mean overlap of boxes and objects, and the median frame.
 
     Detected boxes are solid, boxes of the ellipsoids are dashed, and outlines of the ellipsoids are
     thin. Pixels are undistorted.

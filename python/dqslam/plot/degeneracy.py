@@ -44,7 +44,7 @@ def _draw_singular_values(axes: "Axes", table: DegeneracyTable) -> None:
     axes.axhline(_ZERO, color="0.6", linewidth=0.8, linestyle=":")
     axes.annotate("exactly 0", (1.0, 1.3 * _ZERO), color="0.4", fontsize=9)
     axes.set(xlabel="number", ylabel="singular value / largest", xticks=range(1, 11))
-    axes.set_title("What the boxes say of a dual quadric", fontsize=10)
+    axes.set_title("How well the boxes determine a dual quadric", fontsize=10)
     axes.grid(alpha=0.25, linewidth=0.5)
     axes.legend(frameon=False, fontsize=9, loc="center left")
 

@@ -28,8 +28,8 @@ _NOTHING = 1e-9  # a planar robot has no error along the vertical
 def draw_errors(errors: PoseErrors, kind: Literal["position", "rotation"]) -> "Figure":
     """Draw the errors along each axis of the true world, and the band of 3 sigma around zero.
 
-    For positions [m], also draw the distance from the truth after alignment, and that of the
-    odometry. Rotations are in degrees. An axis without any possible error is left out.
+    Positions are in meters, rotations in degrees. For positions, also draw the distances of the
+    estimate and of odometry from the truth after alignment. An axis without any error is left out.
     """
     seconds = errors.timestamps - errors.timestamps[0]
     values, sigmas = errors.position, errors.position_sigma
@@ -83,5 +83,5 @@ def _draw_legend(figure: "Figure", *, has_band: bool, has_odometry: bool) -> Non
     if has_odometry:
         handles.insert(0, Line2D([], [], color=ODOMETRY, linewidth=0.8, label="odometry"))
     if has_band:
-        handles.append(Patch(color=SKY, alpha=0.35, linewidth=0, label="3σ, claimed"))
+        handles.append(Patch(color=SKY, alpha=0.35, linewidth=0, label="3σ"))
     legend_above(figure, handles)

@@ -29,8 +29,8 @@ def draw_boxes(
 ) -> Ints:
     """Draw the detected boxes of a pose, and return the rows of their objects.
 
-    With ``lens`` the pixels are those of the image as recorded. ``unmapped`` is the color of boxes
-    without an object in the map. Boxes that were held out are dotted.
+    With ``lens``, pixels are those of the image as recorded; otherwise they are undistorted.
+    ``unmapped`` is the color of boxes without an object in the map. Held-out boxes are dotted.
     """
     rows = np.flatnonzero(fits.boxes.pose == pose)
     boxes = fits.boxes.box[rows]

@@ -8,7 +8,7 @@ _GAP = 5.0  # a longer interval than this multiple of the usual one is a gap
 
 
 def break_at_gaps(timestamps: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """Return times (n,) and values (n, ...) with a row of NaN in each gap of time."""
+    """Return times (n,) and values (n, ...), with a row of NaN inserted in each gap of time."""
     steps = np.diff(timestamps)
     usual = float(np.median(steps)) if len(steps) else 0.0
     gaps = np.flatnonzero(steps > _GAP * usual) + 1

@@ -1,4 +1,4 @@
-"""Labels beside outlines, where there is room."""
+"""Labels beside outlines, where there is free space."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -26,8 +26,9 @@ def place_labels(
 ) -> int:
     """Write a text beside each outline (2, n), so that none covers another; return their number.
 
-    Each text gets the nearest of a few free places; a far one has a line in the outline's color. An
-    outline without a free place gets no text. Limits and size of the axes must be final.
+    A text is at the nearest of some candidate places that is free. If it is far, a line in the
+    color of the outline leads to it. An outline without a free place gets no text. Limits and size
+    of the axes must be final.
     """
     from matplotlib.patheffects import withStroke
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _COLUMNS = 3
-_AROUND_M = 8.0  # largest margin around the truth, so that no diverged estimate shrinks it
+_AROUND_M = 8.0  # largest margin around the truth, which limits the effect of a lost estimate
 _PANEL_INCHES = 4.2
 _DPI = 150
 
@@ -53,7 +53,7 @@ def plot_maps(maps: Sequence[tuple[str, Estimate, Truth]], path: str | Path) -> 
 
 
 def _window(maps: Sequence[tuple[str, Estimate, Truth]]) -> tuple[Floats, Floats]:
-    """Return the corners (2,) of the window, which shows all of the truth and what is near it."""
+    """Return the corners (2,) of the window, with the truth and everything near it."""
     lows, highs = [], []
     for _, estimate, truth in maps:
         low, high = truth.poses[:, :2].min(axis=0), truth.poses[:, :2].max(axis=0)

@@ -30,7 +30,7 @@ class Overlay:
     """One image at a time, with the objects of the map.
 
     Outlines of ellipsoids with a box in the image are thick and have a name. The others are dashed,
-    because they may be occluded. Boxes are thin; those without an object are white.
+    because the objects may be occluded. Boxes are thin. Those without an object are white.
     """
 
     def __init__(self, results: Results) -> None:
@@ -45,7 +45,13 @@ class Overlay:
         self._axes = self.figure.add_axes((0.0, 0.0, 1.0, 1.0))
 
     def draw(self, pose: int, image: Path) -> "Figure":
-        """Draw an image and the objects from a pose; FileError if it is not such an image."""
+        """Draw an image and the objects from a pose.
+
+        Raises
+        ------
+        FileError
+            If the file is no image of the camera's size.
+        """
         pixels = read_image(image)
         camera, axes = self._results.camera, self._axes
         height, width = pixels.shape[:2]
@@ -102,7 +108,7 @@ class Overlay:
             )
 
     def _write_name(self, axes: "Axes", name: str, outline: Floats, color: str) -> None:
-        """Write a name above an outline, or as near to that as possible within the image."""
+        """Write a name above an outline, or as near as possible within the image."""
         camera, size = self._results.camera, 6.5 * self._scale
         half = 0.33 * len(name) * size * _DPI / 72.0
         low, high = np.nanmin(outline, axis=0), np.nanmax(outline, axis=0)
@@ -142,7 +148,7 @@ def save_stills(
         for done, (pose, image) in enumerate(images.items(), start=1):
             path = folder / f"{image.stem}.png"
             if path.exists() and path.samefile(image):
-                raise FileError(path, "is the image itself: it would be lost")
+                raise FileError(path, "is the image itself, which would be overwritten")
             save_figure(overlay.draw(pose, image), path, dpi=_DPI)
             written.append(path)
             progress(done / len(images))
@@ -159,12 +165,12 @@ def save_video(
 ) -> None:
     """Write images, by their poses, with their objects as a film, MP4 or GIF by its suffix.
 
-    ``rate`` is in frames a second, by default that of the poses. The file is whole or not there.
+    ``rate`` is in frames per second, by default that of the poses. The file is complete or absent.
 
     Raises
     ------
     FileError
-        For another suffix, for MP4 without ffmpeg, or for an image that cannot be read.
+        If the suffix is another one, if MP4 lacks ffmpeg, or if an image cannot be read.
     """
     check_video(path)
     if rate is None:
@@ -183,13 +189,13 @@ def check_video(path: Path) -> None:
     if path.suffix.lower() not in VIDEOS:
         raise FileError(path, f"its name ends in none of {', '.join(VIDEOS)}")
     if path.suffix.lower() == ".mp4" and shutil.which("ffmpeg") is None:
-        raise FileError(path, "MP4 needs ffmpeg (apt-get install ffmpeg); .gif does without")
+        raise FileError(path, "MP4 needs ffmpeg (apt-get install ffmpeg); .gif does not")
 
 
 def usual_rate(timestamps: Floats) -> float:
-    """Return the frame rate [Hz] that plays poses of these times, (n,) s, in real time.
+    """Return the frame rate [Hz] that shows poses at these times, (n,) s, in real time.
 
-    It is 10 Hz if real time cannot be watched, for example if time stamps only count.
+    It is 10 Hz if that rate is too low or too high, for example if times are numbers of frames.
     """
     if len(timestamps) < 2:
         return _USUAL_RATE

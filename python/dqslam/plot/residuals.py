@@ -1,4 +1,4 @@
-"""How well boxes fit: residuals compared with the noise model."""
+"""Residuals of boxes compared with the noise model."""
 
 from typing import TYPE_CHECKING
 
@@ -26,19 +26,20 @@ _LARGEST_CHI2, _LARGEST_SIGMA = 20.0, 5.0
 
 
 def draw_residuals(fits: BoxFits) -> "Figure":
-    """Draw histograms of whole boxes against chi-square with 4 dof, of edges against a Gaussian.
+    """Draw histograms of boxes with the density of chi-square, and of edges with a Gaussian.
 
-    Values beyond either end are in the last bin, which is hatched. Boxes that were held out from
-    the estimator have a line of their own.
+    Chi-square has 4 degrees of freedom; boxes that the image border cuts are left out. Values
+    beyond an end of the axis are in the last bin, which is hatched. Boxes that were held out from
+    the estimator have a separate line.
     """
     from scipy.stats import chi2, norm
 
-    held_out, whole = fits.boxes.held_out, fits.is_whole
+    held_out, uncut = fits.boxes.held_out, fits.is_uncut
     with column_style():
         figure = new_figure(COLUMN_INCHES, 2.0)
         left, right = figure.subplots(1, 2)
         bins = np.linspace(0.0, _LARGEST_CHI2, 21)
-        _draw_histogram(left, fits.chi2[whole & ~held_out], fits.chi2[whole & held_out], bins)
+        _draw_histogram(left, fits.chi2[uncut & ~held_out], fits.chi2[uncut & held_out], bins)
         x = np.linspace(0.0, _LARGEST_CHI2, 200)
         left.plot(x, chi2.pdf(x, _EDGES), color="black", label="χ², 4 dof", gid="expected")
         gate = float(chi2.ppf(_GATE, _EDGES))
@@ -61,7 +62,7 @@ def draw_residuals(fits: BoxFits) -> "Figure":
         right.set(xlabel="residual of an edge [σ]", xlim=(-_LARGEST_SIGMA, _LARGEST_SIGMA))
         for axes in (left, right):
             axes.grid(alpha=0.25, linewidth=0.4)
-        _draw_legend(figure, any_held_out=bool((held_out & whole).any()))
+        _draw_legend(figure, any_held_out=bool((held_out & uncut).any()))
     return figure
 
 

@@ -38,10 +38,10 @@ def plot_results(
     max_time_difference: float | None = None,
     progress: Callable[[float], None] = lambda share: None,
 ) -> Drawn:
-    """Draw all figures that the results allow into files of a kind, "svg", "png" or "pdf".
+    """Draw all figures that the results allow, as files of a kind: "svg", "png" or "pdf".
 
     These are ``map``, ``boxes``, ``residuals``, and with a true trajectory ``position_error`` and
-    ``rotation_error``; docs/plots.md describes each. Nothing is written unless all can be drawn.
+    ``rotation_error``. docs/plots.md describes each. If one cannot be drawn, nothing is written.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def _draw_boxes(results: Results, figures: dict[str, "Figure"], left_out: dict[s
         left_out |= dict.fromkeys(("boxes", "residuals"), "no box shows an object of the map")
         return
     figures["boxes"] = draw_worst_and_median(results, fits)
-    if fits.is_whole.any():
+    if fits.is_uncut.any():
         figures["residuals"] = draw_residuals(fits)
     else:
         left_out["residuals"] = "no box of a mapped object is free of the image border"

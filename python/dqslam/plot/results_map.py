@@ -42,7 +42,7 @@ _TRUE_PATH: dict[str, Any] = {"color": TRUTH, "linewidth": 2.4, "alpha": 0.5, "l
 
 @dataclass(frozen=True, eq=False)
 class MapTruth:
-    """The truth in its own world, and the motion that brings the estimate there."""
+    """The truth in its own world, and the motion that moves the estimate into it."""
 
     timestamps: Floats
     """Times of the poses, seconds, shape (n,)."""
@@ -56,9 +56,9 @@ class MapTruth:
 def draw_results_map(results: Results, truth: MapTruth | None = None) -> "Figure":
     """Draw odometry, estimate, objects by class, uncertainty of 2 sigma, and the truth if known.
 
-    With a truth everything is in its world, and odometry and estimate are moved by the same motion.
-    Objects are outlines from above, and covariances of their centers are dotted; an object that is
-    not an ellipsoid is a cross.
+    With a truth, everything is in its world, and the same motion moves odometry and estimate.
+    Objects are outlines from above. Covariances of their centers are dotted. An object that is no
+    ellipsoid is a cross.
     """
     move = Alignment(np.eye(3), np.zeros(3)) if truth is None else truth.alignment
     estimate, odometry = (
@@ -103,7 +103,7 @@ def draw_results_map(results: Results, truth: MapTruth | None = None) -> "Figure
 
 
 def _window(paths: list[Floats], others: list[Floats]) -> tuple[Floats, Floats]:
-    """Return the corners (2,) of the window, which shows the paths and what is near them."""
+    """Return the corners (2,) of the window, with the paths and everything near them."""
     every = np.vstack(paths)
     low, high = every.min(axis=0), every.max(axis=0)
     beyond = _LOST * max(float((high - low).max()), 1e-3)
@@ -126,7 +126,7 @@ def _true_path(view: FromAbove, truth: MapTruth) -> Floats:
 
 
 def _outlines(view: FromAbove, objects: MapObjects, move: Alignment) -> list[Floats]:
-    """Return the outline of each object (2, n); a point where it is no ellipsoid."""
+    """Return the outline of each object (2, n), or its center (2, 1) if it is no ellipsoid."""
     centers = move.apply(objects.centers)
     turn = move.scale * move.rotation
     shapes = turn @ _core.ellipsoid_shapes(objects.ellipsoids) @ turn.T

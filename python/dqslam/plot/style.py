@@ -1,4 +1,4 @@
-"""The style of all figures: colors that the color-blind can distinguish, sizes, files."""
+"""The style of all figures: sizes, files, and colors that color-blind readers can distinguish."""
 
 import contextlib
 from collections import Counter
@@ -51,7 +51,7 @@ _NO_DATE = {"svg": {"Date": None}, "pdf": {"CreationDate": None}, "png": None}
 
 @contextlib.contextmanager
 def column_style() -> Iterator[None]:
-    """Draw and save figures with the sizes for a column of text."""
+    """Use the sizes for a column of text, for drawing and for saving figures."""
     from matplotlib import rc_context
 
     with rc_context(_RC):  # type: ignore[arg-type]
@@ -69,7 +69,10 @@ def new_figure(width: float, height: float) -> "Figure":
 
 
 def class_styles(class_names: Iterable[str]) -> dict[str, dict[str, Any]]:
-    """Return color and line style of each class, frequent ones first; names are one per object."""
+    """Return the color and line style of each class, frequent classes first.
+
+    ``class_names`` has the class of each object.
+    """
     styles: dict[str, dict[str, Any]] = {}
     for place, (name, _) in enumerate(Counter(class_names).most_common()):
         turn, color = divmod(place, len(_CLASS_COLORS))
@@ -92,7 +95,7 @@ def legend_above(figure: "Figure", handles: "Sequence[Artist]") -> None:
 
 
 def save_figure(figure: "Figure", path: str | Path, *, dpi: float = _DPI) -> None:
-    """Write a figure, whole or not at all, in the format of its suffix."""
+    """Write a figure in the format of its suffix; the file is complete or absent."""
     path = Path(path)
     kind = path.suffix.lstrip(".").lower()
     if kind not in FORMATS:

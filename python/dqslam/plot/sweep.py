@@ -30,16 +30,16 @@ if TYPE_CHECKING:
 SUMMARY = "summary.json"
 _COLORS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY)
 _MARKERS = "os^Dvp"
-_LOG_FROM = 20.0  # a range up to this multiple of its least value is linear, a wider one in decades
+_LOG_FROM = 20.0  # an axis is logarithmic if its values differ by this factor or more
 _MOST_SERIES = 6
 _APART = 0.012  # share of the axis between the points of two series
-# The metrics that are drawn, as far as they were measured; else the first two.
+# The metrics that are drawn if they were measured. Without these, the first two are drawn.
 _SHOWN = {"rmse_pos": "positions", "rmse_landmark": "centers"}
 
 
 @dataclass(frozen=True)
 class _Places:
-    """The places of a parameter's values on the axis: numbers, or names side by side."""
+    """Places of a parameter's values on the axis. Values that are no numbers are side by side."""
 
     names: list[str] | None
     in_decades: bool
@@ -83,20 +83,20 @@ def read_summary(folder: Path) -> dict[str, Any]:
 
 
 def draw_sweep(summary: dict[str, Any], parameter: str | None = None) -> Figure:
-    """Draw the median of each metric against a parameter, by default the first, a line per series.
+    """Draw the median of each metric against a parameter, by default the first.
 
-    A series has all cells that are equal in the other parameters. More than six series become a
-    single one of points. Bars are the confidence intervals of the medians.
+    A series has all cells with equal values of the other parameters, and is drawn as a line. More
+    than six series are drawn as one series of points. Bars are confidence intervals of the medians.
 
     Raises
     ------
     ValueError
-        For a parameter that was not varied.
+        If the parameter was not varied.
     """
     parameters = summary["parameters"]
     parameter = parameters[0] if parameter is None else parameter
     if parameter not in parameters:
-        raise ValueError(f"{parameter} was not varied; that were {', '.join(parameters)}")
+        raise ValueError(f"{parameter} was not varied; varied were {', '.join(parameters)}")
     metrics = [name for name in _SHOWN if name in summary["units"]] or list(summary["units"])[:2]
     others = [name for name in parameters if name != parameter]
     series: dict[str, list[dict[str, Any]]] = {}
@@ -169,7 +169,7 @@ def _draw_metric(
 
 
 def _bounds(spread: dict[str, Any]) -> tuple[float, float]:
-    """Return the ends of the interval of the median, or the median itself without one."""
+    """Return both ends of the median's interval, or the median twice if there is none."""
     interval = spread["median_interval"]
     if interval is None:
         return spread["median"], spread["median"]

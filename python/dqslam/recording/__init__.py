@@ -1,9 +1,9 @@
-"""What an estimator may see (Recording) and what it may not (Truth).
+"""The input of an estimator (Recording), and the truth for its evaluation (Truth).
 
 Conventions are those of the core (blocks.h): SE(2) poses [x, y, theta], SE(3) poses
 [tx, ty, tz, qx, qy, qz, qw], meters, radians, pixels, seconds; boxes [u_min, v_min, u_max, v_max]
 with whole numbers at pixel centers. d is the pose size (3 or 7), k the tangent size (3 or 6).
-Every array is copied, checked and made read-only; what is wrong is named by array and row.
+Every array is copied, checked and made read-only. Errors name the array and the row.
 """
 
 from dqslam.recording.detections import Detections as Detections

@@ -1,4 +1,4 @@
-"""Boxes that a detector drew."""
+"""The boxes of a detector."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -18,10 +18,10 @@ _CORNER = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Detections:
-    """Boxes that a detector drew, one row each."""
+    """The boxes of a detector, one row each."""
 
     pose: Ints
-    """Row of the pose it was seen from, shape (m,)."""
+    """Row of the pose from which it was observed, shape (m,)."""
     box: Floats
     """[u_min, v_min, u_max, v_max] in undistorted pixels, shape (m, 4)."""
     score: Floats
@@ -29,12 +29,11 @@ class Detections:
     class_id: Ints
     """Shape (m,)."""
     object_id: Ints
-    """Which object it shows, -1 when unknown; shape (m,)."""
+    """Id of the object that it shows, -1 if unknown; shape (m,)."""
     class_names: dict[int, str] = field(default_factory=dict)
     """Name of every class id that occurs."""
     truncated: Bools = field(default_factory=lambda: np.zeros((0, 4), dtype=np.bool_))
-    """Which edges are the border of the image, which the object leaves; shape (m, 4), none by
-    default."""
+    """Whether each edge is cut by the image border, shape (m, 4); by default none is."""
 
     def __post_init__(self) -> None:
         """Check shapes and numbers."""
@@ -68,29 +67,30 @@ class Detections:
         score: ArrayLike | None = None,
         camera: Camera | None = None,
     ) -> Self:
-        """Take corners as detectors give them, in pixels from the corner of the image.
+        """Make detections from corners in pixels that are counted from the corner of the image.
 
-        There, an image spans 0 to its width; in ``box`` it spans -0.5 to width - 0.5.
+        In these pixels, an image spans 0 to its width. In ``box`` it spans -0.5 to width - 0.5.
 
         Parameters
         ----------
         pose
-            Row of the pose that each box was seen from, shape (m,), or one number for all.
+            Row of the pose from which each box was observed, shape (m,), or one number for all.
         xyxy
             [x_min, y_min, x_max, y_max], shape (m, 4).
         object_id
-            Which object each box shows, shape (m,); by default unknown, as ``associate`` finds out.
+            Id of the object that each box shows, shape (m,), by default unknown. ``associate``
+            finds unknown ones.
         class_id, class_names
-            Shape (m,), and the name of each number. Without names, a class is called by its number;
-            without both, all boxes are of the class "object".
+            Number of each class, shape (m,), and the names of the numbers. Without names, the
+            number is the name. Without both, all boxes are of the class "object".
         score
-            Shape (m,), by default 1.
+            Confidence of the detector, shape (m,), by default 1.
         camera
-            One with distortion: the boxes were drawn in its images and become undistorted.
+            If given, boxes are in distorted pixels of this camera and are undistorted.
 
         Examples
         --------
-        Two boxes in the image that was taken at pose 0, one at pose 1:
+        Two boxes in the image at pose 0, one in the image at pose 1:
 
         >>> import dqslam as dq
         >>> xyxy = [[100, 80, 181, 190], [300, 120, 420, 260], [103, 80, 184, 191]]
@@ -129,19 +129,19 @@ class Detections:
         pose: ArrayLike | None = None,
         camera: Camera | None = None,
     ) -> Self:
-        """Take what the library supervision has of each image: a list of ``sv.Detections``.
+        """Make detections from those of the library supervision, one ``sv.Detections`` per image.
 
-        Confidence, class and the ids of a tracker are used where they are there.
+        Confidence, class and the ids of a tracker are used if they exist.
 
         Parameters
         ----------
         images
-            One ``supervision.Detections`` per image, empty ones too.
+            One ``supervision.Detections`` per image, including empty ones.
         pose
             Row of the pose at which each image was taken; by default the first image belongs to
             the first pose, and so on.
         camera
-            One with distortion: the boxes were drawn in its images and become undistorted.
+            If given, boxes are in distorted pixels of this camera and are undistorted.
         """
         return cls._from_detector(read_supervision(images), pose, camera)
 
@@ -153,10 +153,9 @@ class Detections:
         pose: ArrayLike | None = None,
         camera: Camera | None = None,
     ) -> Self:
-        """Take what Ultralytics' ``predict`` or ``track`` returns: one ``Results`` per image.
+        """Make detections from Ultralytics' ``predict`` or ``track``, one ``Results`` per image.
 
-        The ids of ``track`` are used where they are there; parameters are those of
-        ``from_supervision``.
+        The ids of ``track`` are used if they exist. Parameters are those of ``from_supervision``.
         """
         return cls._from_detector(read_ultralytics(images), pose, camera)
 

@@ -1,4 +1,4 @@
-"""What detectors return, read by the names of its attributes: neither library is imported."""
+"""Read the output of detector libraries by its attributes, without importing the libraries."""
 
 from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple
@@ -10,12 +10,12 @@ from dqslam._checks import Ints
 
 
 class DetectedBoxes(NamedTuple):
-    """Boxes of some images, one row each; what a detector may leave out is filled in."""
+    """Boxes of some images, one row each; parts that a detector left out have defaults."""
 
     images: int
-    """How many images there are, those without boxes too."""
+    """Number of images, including those without boxes."""
     image: Ints
-    """Which of them each box is in, shape (m,)."""
+    """Number of the image of each box, shape (m,)."""
     xyxy: NDArray[Any]
     """Corners in pixels from the corner of the image, shape (m, 4)."""
     score: NDArray[Any]
@@ -23,13 +23,13 @@ class DetectedBoxes(NamedTuple):
     class_id: NDArray[Any]
     """Shape (m,)."""
     object_id: NDArray[Any]
-    """A tracker's, -1 for none, shape (m,)."""
+    """Ids of a tracker, -1 for none, shape (m,)."""
     class_names: dict[int, str]
-    """Of every class id that occurs."""
+    """Name of each class id that occurs."""
 
 
 class _Image(NamedTuple):
-    """What is said of one image: None where nothing is."""
+    """The output of a detector for one image; parts that it does not have are None."""
 
     xyxy: object
     score: object

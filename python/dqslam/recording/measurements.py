@@ -1,4 +1,4 @@
-"""What was measured between poses and objects, beside boxes."""
+"""Measurements between poses and objects, other than boxes."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ from dqslam._repr import counted
 
 @dataclass(frozen=True, eq=False)
 class Measurements:
-    """Measurements of one kind between poses and objects, m numbers each.
+    """Measurements of one kind between poses and objects, with m numbers each.
 
     Kinds are those of the core: "position" (m = 3, the center in the robot frame, meters) and
     "range" (m = 1, the distance from the robot to the center, meters).
@@ -18,7 +18,7 @@ class Measurements:
 
     kind: str
     pose: Ints
-    """Row of the pose it was measured from, shape (p,)."""
+    """Row of the pose from which it was measured, shape (p,)."""
     object_id: Ints
     """Shape (p,)."""
     value: Floats

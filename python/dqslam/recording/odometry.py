@@ -1,4 +1,4 @@
-"""How a robot moved from pose to pose, as it measured it."""
+"""The motion of a robot from pose to pose, as it was measured."""
 
 from dataclasses import dataclass
 from typing import Self
@@ -22,8 +22,10 @@ class Odometry:
     relative: Floats
     """next_in_previous, shape (n - 1, d)."""
     covariance: Floats
-    """In the tangent at `relative`, translation [m] first, then rotation [rad],
-    both in the frame of the next pose; shape (n - 1, k, k)."""
+    """Covariance in the tangent at `relative`, shape (n - 1, k, k).
+
+    Translation [m] is first, then rotation [rad], both in the frame of the next pose.
+    """
 
     def __post_init__(self) -> None:
         """Check shapes and numbers."""
@@ -39,20 +41,20 @@ class Odometry:
 
     @classmethod
     def from_poses(cls, poses: ArrayLike, *, covariance: ArrayLike) -> Self:
-        """Take the steps between poses that odometry has summed up.
+        """Make odometry from the poses that it has led to.
 
         Parameters
         ----------
         poses
             world_from_robot, shape (n, 3) for [x, y, theta] or (n, 7) for [tx, ty, tz, qx, qy, qz,
-            qw]; their width tells the model.
+            qw]. The width selects the pose model.
         covariance
-            Of every step alike, shape (k, k), or of each, shape (n - 1, k, k).
+            Covariance of every step, shape (k, k), or of each step, shape (n - 1, k, k).
 
         Examples
         --------
-        A robot drives two meters, then one more while it turns left. Each step errs by 2 cm along
-        each axis and 0.01 rad:
+        A robot drives two meters, then one more while it turns left. Each step has a sigma of 2 cm
+        along each axis and of 0.01 rad:
 
         >>> import dqslam as dq
         >>> import numpy as np

@@ -1,4 +1,4 @@
-"""Where objects are, as a depth camera measures it."""
+"""Measured positions of objects, for example from a depth camera."""
 
 from dataclasses import dataclass, replace
 from typing import Self
@@ -11,10 +11,10 @@ from dqslam._repr import counted
 
 @dataclass(frozen=True, eq=False)
 class RelativePositions:
-    """Measured centers of objects relative to the robot, as a depth camera gives them."""
+    """Measured centers of objects relative to the robot, for example from a depth camera."""
 
     pose: Ints
-    """Row of the pose it was seen from, shape (p,)."""
+    """Row of the pose from which it was measured, shape (p,)."""
     object_id: Ints
     """Shape (p,)."""
     object_in_robot: Floats

@@ -1,4 +1,4 @@
-"""All that an estimator may see."""
+"""The input of an estimator."""
 
 from dataclasses import dataclass
 
@@ -15,15 +15,15 @@ from dqslam.recording.positions import RelativePositions
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """All that an estimator may see.
+    """Everything that an estimator may use.
 
     Examples
     --------
-    A robot with a camera that looks ahead passes a box, which a detector has drawn three times:
+    A robot with a camera that looks ahead passes an object, and a detector finds it three times:
 
     >>> import dqslam as dq
     >>> import numpy as np
-    >>> ahead = [0.2, 0.0, 0.5, -0.5, 0.5, -0.5, 0.5]  # where the camera is on the robot
+    >>> ahead = [0.2, 0.0, 0.5, -0.5, 0.5, -0.5, 0.5]  # mount of the camera on the robot
     >>> camera = dq.Camera(500, 500, 319.5, 239.5, 640, 480, robot_from_camera=ahead)
     >>> poses = [[0.0, 0.0, 0.0], [0.5, 0.0, 0.0], [1.0, 0.0, 0.0]]
     >>> odometry = dq.Odometry.from_poses(poses, covariance=np.diag([0.02, 0.02, 0.01]) ** 2)
@@ -40,10 +40,10 @@ class Recording:
     detections: Detections
     positions: RelativePositions | None = None
     measurements: tuple[Measurements, ...] = ()
-    """Beside boxes and positions, one entry a kind."""
+    """Other measurements, with one entry per kind."""
 
     def __post_init__(self) -> None:
-        """Check that the parts belong together."""
+        """Check that the parts fit together."""
         timestamps = as_floats("timestamps", self.timestamps, [None])
         stalls = np.concatenate([[False], np.diff(timestamps) <= 0.0])[: len(timestamps)]
         reject_rows("timestamps", stalls, "time does not increase", timestamps)

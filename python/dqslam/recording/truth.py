@@ -1,4 +1,4 @@
-"""What only a simulator knows."""
+"""The truth of a simulation."""
 
 from dataclasses import dataclass
 
@@ -12,23 +12,23 @@ from dqslam.recording.poses import as_poses
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """The answer that a simulator knows: for evaluation only."""
+    """The truth of a simulation, for evaluation only."""
 
     pose_model: PoseModel
     poses: Floats
     """world_from_robot, shape (n, d)."""
     object_id: Ints
-    """Of every object of the world, detected or not; shape (o,)."""
+    """Id of every object of the world, detected or not; shape (o,)."""
     center: Floats
-    """In the world, meters, shape (o, 3)."""
+    """Centers in the world, meters, shape (o, 3)."""
     volume: Floats
     """Cubic meters, shape (o,)."""
     class_name: tuple[str, ...]
     """One per object."""
     ellipsoids: Floats | None = None
-    """Center and log-Cholesky shape, shape (o, 9); None when the objects are no ellipsoids."""
+    """Center and log-Cholesky shape, shape (o, 9); None if the objects are no ellipsoids."""
     box_object_id: Ints | None = None
-    """Which object each box of the recording shows, whatever its id says; shape (m,)."""
+    """True object of each box of the recording, independent of its id; shape (m,)."""
 
     def __post_init__(self) -> None:
         """Check shapes and numbers."""

@@ -41,18 +41,22 @@ Progress = Callable[[int, int], None]
 
 @dataclass(frozen=True)
 class Variant:
-    """The default estimator with some parts changed; ids are right unless wrong ones are named."""
+    """The default estimator with some parts changed, and the ids that it is given."""
 
     residual: Residual = Residual.TANGENT_THEN_BOX
     start: Start = Start.SPHERE
     schedule: Schedule = Schedule.GROW
     loss: Loss = Loss.NONE
     wrong_ids: WrongKind | None = None
-    told: bool = False
+    """The kind of wrong ids; None if all ids are right."""
+    oracle: bool = False
     """Whether boxes with wrong ids are left out beforehand."""
 
     def options(self) -> SolveOptions:
-        """Return the solver's options; raw algebraic goes with free dual quadrics, as published."""
+        """Return the options of the solver.
+
+        The raw algebraic residual uses free dual quadrics, as published.
+        """
         options = SolveOptions(
             residual=self.residual, start=self.start, schedule=self.schedule, loss=self.loss
         )
@@ -64,32 +68,36 @@ class Variant:
 
 CLEAN_VARIANTS = tuple(Variant(*parts) for parts in product(Residual, Start, Schedule))
 ROBUST_VARIANTS = tuple(
-    Variant(loss=loss, wrong_ids=kind, told=told)
+    Variant(loss=loss, wrong_ids=kind, oracle=oracle)
     for kind in WRONG_KINDS
-    for loss, told in [(Loss.NONE, True), *((loss, False) for loss in Loss)]
+    for loss, oracle in [(Loss.NONE, True), *((loss, False) for loss in Loss)]
 )
 VARIANTS = CLEAN_VARIANTS + ROBUST_VARIANTS
 
 
 @dataclass(frozen=True)
 class VariantSolve:
-    """One solve of one trial; no error where it failed."""
+    """One solve of one trial."""
 
     reached: bool
-    """Whether it ended at the cost that a start at the truth reaches. If it minimizes another cost,
-    because of its residual or of wrong ids, whether a polish with the right ids ends there."""
+    """Whether it ended at the cost that a start at the truth reaches.
+
+    A solve may minimize another cost, because of its residual or of wrong ids. Then this is whether
+    a polish with the right ids ends at that cost.
+    """
     error_m: float
-    """Mean distance of the poses from the truth; NaN where the solve failed."""
+    """Mean distance of the poses from the truth; NaN if the solve failed."""
     bound_m: float
-    """The expected error of the best possible estimator: the posterior bound at the truth."""
+    """The posterior bound at the truth: the least expected error of any estimator."""
     iterations: int
     seconds: float
     failure: str = ""
+    """The error if the solve failed."""
 
 
 @dataclass(frozen=True, eq=False)
 class AblationTrial:
-    """One seed, with every variant."""
+    """The solves of one seed, by variant."""
 
     seed: int
     solves: dict[Variant, VariantSolve] = field(default_factory=dict)
@@ -100,33 +108,35 @@ class _Problem:
     """The problem of one seed with one kind of data."""
 
     graph: Graph
-    told: Graph
+    right_graph: Graph
     """The same problem without the boxes whose ids are wrong."""
     truth: Truth
     bound_m: float
     best_cost: float
-    """Cost of the default estimator that knows the right ids and starts at the truth."""
+    """Cost that the default estimator reaches from the truth, with the right ids."""
 
     def graph_of(self, variant: Variant) -> Graph:
         """Return the problem that a variant solves."""
-        return self.told if variant.told else self.graph
+        return self.right_graph if variant.oracle else self.graph
 
     def is_optimum(self, variant: Variant, solution: _core.Solution) -> bool:
-        """Return whether a solution has the best cost, or leads to it if its own cost is another.
+        """Return whether a solution reaches the best cost.
 
-        A solve that minimizes the very same cost is compared as it is; any other is polished first.
+        If the variant minimizes another cost, its solution is polished with the right ids first.
         """
         cost = solution.summary.final_cost
         same = variant.residual in (Residual.BOX, Residual.TANGENT_THEN_BOX) and (
-            variant.told or variant.wrong_ids is None
+            variant.oracle or variant.wrong_ids is None
         )
         if not same:
-            rows = np.searchsorted(self.graph_of(variant).object_ids, self.told.object_ids)
+            rows = np.searchsorted(self.graph_of(variant).object_ids, self.right_graph.object_ids)
             local = SolveOptions(residual=Residual.BOX, schedule=Schedule.BATCH)
             try:
                 quadrics = solution.dual_quadrics[rows]
                 ellipsoids = [_core.ellipsoid_from_dual_quadric(q) for q in quadrics]
-                polished = _core.solve(self.told.core, local, State(solution.poses, ellipsoids))
+                polished = _core.solve(
+                    self.right_graph.core, local, State(solution.poses, ellipsoids)
+                )
             except (RuntimeError, ValueError):
                 return False
             cost = polished.summary.final_cost
@@ -141,7 +151,7 @@ class Row:
     optimum_rate: float
     """Share of the trials that reached the optimum."""
     error_over_bound: float
-    """Mean error divided by mean bound, of the trials that did not fail; 1 is the best possible."""
+    """Mean error over mean bound, for the trials that did not fail."""
     median_error_over_bound: float
     iterations_med: float
     seconds_med: float
@@ -166,7 +176,7 @@ class AblationTable:
     rows: tuple[Row, ...]
 
     def save(self, path: str | Path) -> None:
-        """Write the table as JSON, whole or not at all."""
+        """Write the table as JSON; the file is complete or absent."""
         table = {
             "trials": self.trials,
             "seed": self.seed,
@@ -188,16 +198,16 @@ def run_ablation(
     variants: tuple[Variant, ...] | None = None,
     progress: Progress | None = None,
 ) -> AblationTable:
-    """Run variants on seeds seed, seed + 1, ...
+    """Run variants on the seeds seed, seed + 1 and so on.
 
     Parameters
     ----------
     jobs
-        Number of processes; with 1 everything runs in this process. Only times depend on it.
+        Number of processes; 1 runs everything in this process. Only times depend on it.
     variants
         The variants to run, by default all.
     progress
-        Called with (trials done, trials) after each.
+        Called with (trials done, trials) after each trial.
     """
     for name, value, least in (("trials", trials, 1), ("seed", seed, 0), ("jobs", jobs, 1)):
         if value < least:
@@ -242,7 +252,7 @@ def _row(variant: Variant, solves: dict[int, VariantSolve]) -> Row:
 
 
 def run_trial(scenario: Scenario, seed: int, *, variants: tuple[Variant, ...]) -> AblationTrial:
-    """Simulate one seed, clean and with wrong ids, and solve with every variant."""
+    """Simulate one seed, with right and with wrong ids, and solve with every variant."""
     scenario = scenario.model_copy(update={"objects": "ellipsoids"})
     clean, truth = simulate(scenario, seed=seed)
     trial = AblationTrial(seed)
@@ -263,14 +273,14 @@ def _problem(
         detector = scenario.detector.model_copy(update=wrong)
         recording, _ = simulate(scenario.model_copy(update={"detector": detector}), seed=seed)
         right = recording.detections.object_id == clean.detections.object_id
-    told = _graph(replace(recording, detections=recording.detections.select(right)))
+    right_graph = _graph(replace(recording, detections=recording.detections.select(right)))
     options = SolveOptions()
-    best = _core.solve(told.core, options, true_state(told, truth, options))
+    best = _core.solve(right_graph.core, options, true_state(right_graph, truth, options))
     return _Problem(
         graph=_graph(recording),
-        told=told,
+        right_graph=right_graph,
         truth=truth,
-        bound_m=posterior_bound(told, truth).position_error,
+        bound_m=posterior_bound(right_graph, truth).position_error,
         best_cost=best.summary.final_cost,
     )
 

@@ -2,7 +2,7 @@
 
 [S&M17] section 4.3 starts from Q* = I because the SVD start "tends to result in degenerate
 solutions in the case of close-to-planar camera trajectories". Here the poses are known (mapping),
-so that only the object can fail.
+so only the object can be wrong.
 """
 
 from collections.abc import Callable
@@ -38,7 +38,7 @@ class CameraMotion(NamedTuple):
 
     poses: Floats  # world_from_robot, SE(2), from the origin on, (n, 3)
     camera_heading: float  # counter-clockwise from forward, rad
-    object_place: Floats  # meters, (3,); each object is near it
+    object_place: Floats  # meters, (3,); objects are near this place
 
 
 def _straight(length_m: float) -> Floats:
@@ -80,14 +80,14 @@ class ObjectSolve:
     """One solve of one object."""
 
     converged: bool
-    """Whether it reached the cost that a start at the truth reaches, or a lower one."""
+    """Whether its cost is at most that of a start at the truth, plus ``COST_TOLERANCE``."""
     center_error_m: float
     is_ellipsoid: bool
 
 
 @dataclass(frozen=True, eq=False)
 class DegeneracyTrial:
-    """One seed: an object for every motion."""
+    """The solves of one seed, which has an object for every motion."""
 
     solves: dict[tuple[str, str, str], ObjectSolve]
     """By motion, estimator and start."""
@@ -129,7 +129,7 @@ def observe(motion: CameraMotion, random: Generator) -> tuple[Graph, Floats]:
         Recording(
             camera=camera,
             timestamps=np.arange(len(motion.poses), dtype=np.float64),
-            # Exact; that the poses are known makes the covariance idle.
+            # The poses are exact and known, so the covariance has no effect.
             odometry=Odometry.from_poses(motion.poses, covariance=np.eye(3)),
             detections=Detections(
                 pose=pose,
@@ -151,12 +151,6 @@ def _camera(heading: float) -> Camera:
     forward = [[0.0, 0.0, 0.0, -0.5, 0.5, -0.5, 0.5]]  # z forward, y down
     robot_from_camera = _core.compose(PoseModel.SE3, mount, forward)[0]
     return Camera(1500.0, 1500.0, 639.5, 511.5, 1280, 1024, robot_from_camera=robot_from_camera)
-
-
-def _exact_odometry(poses: Floats) -> Odometry:
-    """Return odometry without error; its covariance has no effect, because the poses are known."""
-    relative = _core.between(PoseModel.SE2, poses[:-1], poses[1:])
-    return Odometry(PoseModel.SE2, poses[0], relative, np.tile(np.eye(3), (len(relative), 1, 1)))
 
 
 def _solve_object(graph: Graph, options: SolveOptions, ellipsoid: Floats) -> ObjectSolve:
@@ -213,12 +207,15 @@ class DegeneracyTable:
     rows: tuple[Row, ...]
 
     def save(self, path: str | Path) -> None:
-        """Write the table as JSON, whole or not at all."""
+        """Write the table as JSON; the file is complete or absent."""
         write_json(path, asdict(self))
 
 
 def run_degeneracy(*, trials: int, seed: int, progress: Progress | None = None) -> DegeneracyTable:
-    """Run trials with seeds seed, seed + 1, ...; `progress` gets (trials done, trials)."""
+    """Run trials with the seeds seed, seed + 1 and so on.
+
+    ``progress`` is called with (trials done, trials) after each trial.
+    """
     for name, value, least in (("trials", trials, 1), ("seed", seed, 0)):
         if value < least:
             raise ValueError(f"{name}: expected {least} or more, got {value}")

@@ -15,7 +15,10 @@ Numbers = tuple[tuple[str, str], ...]
 
 
 def overview(results: Results, evaluation: Mapping[str, Any]) -> Numbers:
-    """Describe the whole; ``evaluation`` is that of ``evaluate_results``, empty without truth."""
+    """Describe an estimate.
+
+    ``evaluation`` is the result of ``evaluate_results``, or empty without truth.
+    """
     path = np.linalg.norm(np.diff(results.poses[:, :3], axis=0), axis=1).sum()
     shown = [
         ("poses", f"{len(results.timestamps)} over {path:.4g} m"),
@@ -27,7 +30,7 @@ def overview(results: Results, evaluation: Mapping[str, Any]) -> Numbers:
         return tuple(shown)
     shown += [
         ("position error, rmse", _meters(evaluation["ate"]["rmse"])),
-        ("odometry's", _meters(evaluation["odometry_ate"]["rmse"])),
+        ("odometry error, rmse", _meters(evaluation["odometry_ate"]["rmse"])),
     ]
     objects = evaluation["objects"]
     if objects is not None:
@@ -37,11 +40,11 @@ def overview(results: Results, evaluation: Mapping[str, Any]) -> Numbers:
 
 
 def object_numbers(results: Results, evaluation: Mapping[str, Any]) -> list[Numbers]:
-    """Describe each mapped object, with its errors if there is a truth."""
+    """Describe each mapped object, with its errors if ``evaluation`` has true objects."""
     objects, boxes = results.objects, results.boxes
     overlap = None if boxes is None else box_overlaps(results, boxes)
-    judged = evaluation.get("objects")
-    pairs = {pair["id"]: pair for pair in judged["pairs"]} if judged else {}
+    evaluated = evaluation.get("objects")
+    pairs = {pair["id"]: pair for pair in evaluated["pairs"]} if evaluated else {}
     described = []
     for row in range(len(objects)):
         shown = [("center", f"{_vector(objects.centers[row])} m")]
@@ -59,12 +62,14 @@ def object_numbers(results: Results, evaluation: Mapping[str, Any]) -> list[Numb
             known = overlap[mine & np.isfinite(overlap)]
             if len(known):
                 shown.append(("IoU of boxes", f"{np.median(known):.3f}"))
-        described.append((*shown, *_errors(pairs.get(int(objects.object_ids[row])), bool(judged))))
+        described.append(
+            (*shown, *_errors(pairs.get(int(objects.object_ids[row])), bool(evaluated)))
+        )
     return described
 
 
 def true_object_numbers(true: TrueObjects, row: int) -> Numbers:
-    """Describe one object of the truth, in the truth's own world."""
+    """Describe one true object, in the world of the truth."""
     shown = [("true center", f"{_vector(true.center[row])} m")]
     if true.size is not None:
         shown.append(("true size", _lengths(true.size[row])))
@@ -73,16 +78,16 @@ def true_object_numbers(true: TrueObjects, row: int) -> Numbers:
     return tuple(shown)
 
 
-def _errors(pair: Mapping[str, Any] | None, judged: bool) -> Numbers:
+def _errors(pair: Mapping[str, Any] | None, evaluated: bool) -> Numbers:
     if pair is None:
-        return (("truth", "no object like it"),) if judged else ()
-    shown = [("center is off by", _meters(pair["center"]))]
+        return (("truth", "no true object matches"),) if evaluated else ()
+    shown = [("center error", _meters(pair["center"]))]
     if pair["true_id"] is not None:
         shown.insert(0, ("true id", str(pair["true_id"])))
     for title, key, form in (
-        ("size is off by", "size_relative", "{:.0%}"),
+        ("size error", "size_relative", "{:.0%}"),
         ("volume ratio", "volume_ratio", "{:.2f}"),
-        ("turned by", "orientation_deg", "{:.1f}°"),
+        ("orientation error", "orientation_deg", "{:.1f}°"),
         ("IoU in space", "iou_3d", "{:.2f}"),
     ):
         if pair[key] is not None:

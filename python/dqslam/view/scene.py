@@ -1,7 +1,8 @@
-"""The visible scene as plain data: every viewer shows it, and none computes anything.
+"""The scene that viewers show, as plain data. Viewers compute nothing themselves.
 
-The world is that of the estimate, meters; the truth is moved into it. Poses are world_from_camera,
-[tx ty tz qx qy qz qw], boxes [u_min, v_min, u_max, v_max] in undistorted pixels.
+The world is that of the estimate, in meters, and the truth is moved into it. Poses are
+world_from_camera, [tx ty tz qx qy qz qw]. Boxes are [u_min, v_min, u_max, v_max] in undistorted
+pixels.
 """
 
 from __future__ import annotations
@@ -20,11 +21,11 @@ from dqslam.io import BoxTable, MapObjects, Results, Trajectory, TrueObjects
 from dqslam.metrics import Align, Alignment, up_direction
 from dqslam.view.numbers import Numbers, object_numbers, overview, true_object_numbers
 
-# The colors that no path has, then more of the same kind (Tol's).
+# Colors that no path has, then further colors from Tol's palette.
 CLASSES = (ORANGE, SKY, PURPLE, "#882255", "#999933", "#332288", "#44AA99", "#AA4499")
-# If more poses than this multiple of the usual number have no true one, the line has a gap.
+# The true path has a gap if its poses are further apart than this multiple of the usual distance.
 GAP = 5.0
-# The number of standard deviations that is shown.
+# Number of standard deviations of the ellipsoids of uncertainty.
 SIGMAS = 3.0
 CAMERAS = 60
 # Added variance, m^2, so that no axis of an ellipsoid is zero.
@@ -33,7 +34,7 @@ _NOTHING = 1e-18
 
 @dataclass(frozen=True, eq=False)
 class Spread:
-    """The ellipsoid of ``SIGMAS`` standard deviations of a position."""
+    """The ellipsoid of uncertainty of a position, at ``SIGMAS`` standard deviations."""
 
     center: Floats
     """Meters, shape (3,)."""
@@ -51,28 +52,28 @@ class SceneObject:
     """Id of the object, -1 for a true object without one."""
     class_name: str
     color: str
-    """``#rrggbb``, one for each class, or one for each object if there is only one class."""
+    """``#rrggbb``, by class, or by object if there is only one class."""
     center: Floats
     """Meters, shape (3,)."""
     semi_axes: Floats | None
-    """Meters, shape (3,); None if it is not an ellipsoid or has no known size."""
+    """Meters, shape (3,); None if it is no ellipsoid or its size is unknown."""
     orientation_xyzw: Floats | None
-    """world_from_object, shape (4,); None with ``semi_axes``."""
+    """world_from_object, shape (4,); None if ``semi_axes`` is None."""
     center_covariance: Floats | None
-    """Square meters, shape (3, 3); None where unknown."""
+    """Square meters, shape (3, 3); None if unknown."""
     numbers: Numbers
     """Its properties as text."""
 
     @property
     def ellipsoid(self) -> Floats | None:
-        """Center and log-Cholesky shape, shape (9,)."""
+        """Center and log-Cholesky shape, shape (9,); None if it is no ellipsoid."""
         if self.semi_axes is None or self.orientation_xyzw is None:
             return None
         return _core.ellipsoid_from_axes(self.center, self.semi_axes, self.orientation_xyzw)
 
     @property
     def spread(self) -> Spread | None:
-        """The uncertainty of the center."""
+        """The uncertainty of the center; None if unknown."""
         if self.center_covariance is None:
             return None
         return spread_of(self.center, self.center_covariance)
@@ -104,7 +105,7 @@ class Scene:
 
     title: str
     up: Floats
-    """Unit vector away from the ground, shape (3,)."""
+    """Upward unit vector in the world, shape (3,)."""
     camera: _core.Camera
     timestamps: Floats
     """Seconds, shape (n,)."""
@@ -113,20 +114,20 @@ class Scene:
     odometry: Floats
     """Shape (n, 7)."""
     cameras: Ints
-    """Rows of the poses whose cameras are drawn; not all if there are many."""
+    """Rows of the poses whose cameras are drawn, at most ``CAMERAS``."""
     pose_spreads: tuple[Spread, ...]
-    """The uncertainty of positions, where known, of at most as many poses."""
+    """Uncertainties of positions, of at most ``CAMERAS`` poses for which they are known."""
     truth: tuple[Floats, ...]
-    """True poses at the times that have one, in runs without a gap, each of shape (t, 7)."""
+    """True poses, split at gaps into parts of shape (t, 7)."""
     objects: tuple[SceneObject, ...]
     true_objects: tuple[SceneObject, ...]
     boxes: SceneBoxes
     overview: Numbers
-    """The properties of the whole estimate as text."""
+    """The properties of the estimate as text."""
 
 
 def rgb(color: str) -> tuple[int, int, int]:
-    """Return red, green and blue, 0 to 255, of ``#rrggbb``."""
+    """Return red, green and blue of ``#rrggbb``, each 0 to 255."""
     red, green, blue = bytes.fromhex(color[1:])
     return red, green, blue
 
@@ -153,7 +154,7 @@ def build_scene(
     Parameters
     ----------
     groundtruth, objects
-        The true trajectory and objects, in any world; ``evaluate_results`` aligns it.
+        The true trajectory and objects, in any world; ``evaluate_results`` aligns them.
     align
         The kind of motion between both worlds, see ``metrics.align_positions``.
 
@@ -164,7 +165,7 @@ def build_scene(
         match no pose.
     """
     if objects is not None and groundtruth is None:
-        raise ValueError(f"{objects.path}: where true objects lie, only a true trajectory can tell")
+        raise ValueError(f"{objects.path}: true objects need a true trajectory for the alignment")
     evaluation: dict[str, Any] = {}
     truth: tuple[Floats, ...] = ()
     true_objects: tuple[SceneObject, ...] = ()
@@ -202,7 +203,7 @@ def _some(rows: Ints) -> Ints:
 def _pose_spreads(results: Results) -> tuple[Spread, ...]:
     from scipy.spatial.transform import Rotation
 
-    # In the frame of the camera; the first pose is exact, which is no ellipsoid.
+    # In the frame of the camera. The first pose is exact and has no ellipsoid.
     covariance = results.covariances[:, :3, :3]
     known = np.isfinite(covariance).all(axis=(1, 2)) & (covariance != 0.0).any(axis=(1, 2))
     spreads = []
@@ -214,7 +215,7 @@ def _pose_spreads(results: Results) -> tuple[Spread, ...]:
 
 
 def _gaps(rows: Ints) -> Ints:
-    """Return the rows before which far more rows than usual are missing."""
+    """Return the indices into rows (t,), ascending, at which a new part begins after a gap."""
     steps = np.diff(rows)
     return np.asarray(np.flatnonzero(steps > GAP * np.median(steps)) + 1)
 
@@ -228,7 +229,7 @@ def _inverse(true_from_estimated: Mapping[str, Any]) -> Alignment:
 
 
 def _class_colors(mapped: MapObjects, true: TrueObjects | None) -> dict[str, str]:
-    """Return the color of each class, those of the map first; more classes than colors share."""
+    """Return the color of each class, classes of the map first; colors repeat if they run out."""
     names = sorted(set(mapped.class_names))
     names += sorted(set(true.class_name or () if true else ()) - set(names))
     return {name: CLASSES[k % len(CLASSES)] for k, name in enumerate(names)}

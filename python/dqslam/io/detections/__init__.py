@@ -12,7 +12,7 @@ from dqslam.io.detections.rosbag import ARRAYS
 from dqslam.io.detections.table import DetectionTable, checked
 from dqslam.io.detections.yolo import YOLO, read_data_names
 from dqslam.io.files import read_text
-from dqslam.io.formats import Progress, choose_format, tell_nobody
+from dqslam.io.formats import Progress, choose_format, no_progress
 from dqslam.io.frames import FrameTimes
 from dqslam.io.rosbag import topic_option
 
@@ -32,7 +32,7 @@ def read_detections(
     cut: bool = True,
     check: bool = True,
     topic: str | None = None,
-    progress: Progress = tell_nobody,
+    progress: Progress = no_progress,
 ) -> DetectionTable:
     """Read boxes.
 

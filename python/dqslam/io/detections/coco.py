@@ -129,7 +129,7 @@ def _times(
     if frames is not None:
         return frames.at(path, np.array(frame), [entry.line for entry in entries])
     if "timestamp" not in entries[0].fields:
-        message = "coco has no times: say them with --frame-times FILE or --frame-rate HZ"
+        message = "coco has no times: give them with --frame-times FILE or --frame-rate HZ"
         raise FileError(path, message)
     return np.array([entry.number("timestamp") for entry in entries])
 

@@ -36,7 +36,7 @@ def read_mot(
     """Read boxes, unchecked, at the times of their ``frames``."""
     rows, lines = read_rows(path)
     if frames is None:
-        message = "mot has no times: say them with --frame-times FILE or --frame-rate HZ"
+        message = "mot has no times: give them with --frame-times FILE or --frame-rate HZ"
         raise FileError(path, message)
     cells = [row.split(",") for row in rows]
     for row, line in zip(cells, lines, strict=True):

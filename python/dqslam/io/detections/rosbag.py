@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from dqslam.io.detections.table import NO_TRACK, DetectionTable
 from dqslam.io.files import FileError
-from dqslam.io.formats import Format, Progress, tell_nobody
+from dqslam.io.formats import Format, Progress, no_progress
 from dqslam.io.frames import FrameTimes
 from dqslam.io.rosbag import LOOKS, NAME, looks_like_bag, messages, stamp_seconds
 
@@ -34,7 +34,7 @@ def read_detection_arrays(
     frames: FrameTimes | None = None,
     classes: dict[int, str] | None = None,
     topic: str | None = None,
-    progress: Progress = tell_nobody,
+    progress: Progress = no_progress,
 ) -> DetectionTable:
     """Read boxes, unchecked; names of ``classes`` override the bag's."""
     frame, line, times, boxes, scores, labels, tracks = [], [], [], [], [], [], []

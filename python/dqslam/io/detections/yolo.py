@@ -23,7 +23,7 @@ from dqslam.io.files import (
     whole_folder,
     write_text,
 )
-from dqslam.io.formats import Format, Look, Progress, tell_nobody
+from dqslam.io.formats import Format, Look, Progress, no_progress
 from dqslam.io.frames import FrameTimes, frame_of, frame_table, read_frame_times
 from dqslam.io.yaml import parse_yaml
 
@@ -40,7 +40,7 @@ def read_yolo(
     height: int | None = None,
     frames: FrameTimes | None = None,
     classes: dict[int, str] | None = None,
-    progress: Progress = tell_nobody,
+    progress: Progress = no_progress,
 ) -> DetectionTable:
     """Read boxes, unchecked, in images of width x height px."""
     if width is None or height is None:
@@ -51,7 +51,7 @@ def read_yolo(
     if frames is None and (folder / TIMES).is_file():
         frames = read_frame_times(folder / TIMES)
     if frames is None:
-        message = "yolo has no times: say them with --frame-times FILE or --frame-rate HZ"
+        message = "yolo has no times: give them with --frame-times FILE or --frame-rate HZ"
         raise FileError(path, message)
     rows, lines, files, frame = _read_rows(folder, frames, progress)
     columns = dict(zip(FIELDS, zip(*rows, strict=True), strict=True))

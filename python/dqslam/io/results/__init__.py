@@ -1,4 +1,4 @@
-"""The files of an estimate, written and read back.
+"""Write and read the files of an estimate.
 
 ==================  ================================================================================
 ``trajectory.txt``  TUM: estimated poses, world_from_camera.

@@ -1,19 +1,19 @@
-"""Boxes of an estimate as CSV, one row per box: whether it was used, left out, and fits.
+"""Boxes of an estimate as CSV, with a row for each box, used or not.
 
 ``timestamp``
     Seconds; it is the time of a pose in ``trajectory.txt``.
 ``x1 y1 x2 y2``
     Corners in undistorted pixels, with whole numbers at pixel centers.
 ``truncated``
-    The edges among ``x1 y1 x2 y2`` at the border of the image, where it cuts the object.
+    Names of the edges at the border of the image, which cuts the object there.
 ``score class_id class_name``
     The output of the detector.
 ``object_id``
     The object that the box was assigned to, -1 for none.
 ``inlier``
-    1 if the box was used and fits the estimate.
+    1 if the box was used and fits the estimate, else 0.
 ``held_out``
-    1 if the box was not given to the estimator, in order to evaluate it.
+    1 if the box was held out from the estimator for a test, else 0.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ class BoxTable:
     inlier: Bools
     """Whether the box was used and fits, shape (m,)."""
     held_out: Bools
-    """Whether the box was not given to the estimator, shape (m,)."""
+    """Whether the box was held out from the estimator for a test, shape (m,)."""
 
     def __len__(self) -> int:
         """Return the number of boxes."""
@@ -76,7 +76,10 @@ class BoxTable:
 def write_boxes(
     path: str | Path, estimate: Estimate, detections: Detections, held_out: Bools | None
 ) -> None:
-    """Write the boxes; `estimate.inliers` has an entry for each with an object and not held out."""
+    """Write the boxes of an estimate.
+
+    `estimate.inliers` has an entry for each box that has an object and was not held out.
+    """
     held_out = np.zeros(len(detections), dtype=np.bool_) if held_out is None else held_out
     used = (detections.object_id >= 0) & ~held_out
     if len(estimate.inliers) != used.sum():

@@ -4,8 +4,8 @@
     Seconds; it is the time of a pose in ``trajectory.txt``.
 ``c11 c12 .. c16 c22 .. c66``
     The upper triangle of the covariance of the camera's pose in the frame of the camera, for x y
-    z of its position [m] and then of its rotation vector [rad]. The first pose is the gauge: it is
-    exact, and the others are relative to it.
+    z of its position [m] and then of its rotation vector [rad]. The first pose is exact, and the
+    covariances of the others are relative to it.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ ENTRIES = tuple(f"c{row + 1}{column + 1}" for row, column in zip(_ROWS, _COLUMNS
 
 
 def write_covariances(path: str | Path, estimate: Estimate, covariances: Floats) -> None:
-    """Write the covariances of a robot's poses, (n, k, k) or NaN, converted to those of its camera.
+    """Write the covariances of poses (n, k, k), NaN for none, converted from robot to camera.
 
     ``covariances`` is in the frames of the robot's poses, as in ``uncertainty.Marginals``.
     """
@@ -67,7 +67,7 @@ def read_covariances(path: str | Path, timestamps: Floats) -> Floats:
 
 
 def motion_of_camera(model: _core.PoseModel, camera: _core.Camera) -> Floats:
-    """Return what turns a small motion of the robot into that of its camera, shape (6, k)."""
+    """Return the adjoint that maps a small motion of the robot to that of its camera, (6, k)."""
     se3 = _core.PoseModel.SE3
     camera_from_robot = _core.inverse(se3, camera.robot_from_camera[None])
     (full,) = _core.adjoint(se3, camera_from_robot)

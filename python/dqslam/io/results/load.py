@@ -31,19 +31,19 @@ class MapObjects:
     centers: Floats
     """In the world, meters, shape (o, 3)."""
     semi_axes: Floats
-    """Descending, meters, shape (o, 3); NaN where the object is no ellipsoid."""
+    """Descending, meters, shape (o, 3); NaN for an object that is no ellipsoid."""
     orientations: Floats
-    """world_from_object, x y z w, shape (o, 4); NaN where it is no ellipsoid."""
+    """world_from_object, x y z w, shape (o, 4); NaN for an object that is no ellipsoid."""
     dual_quadrics: Floats
-    """q1 .. q9 with Q*(4,4) = 1, shape (o, 9); NaN where the file has none."""
+    """q1 .. q9 with Q*(4,4) = 1, shape (o, 9); NaN if the file has none."""
     observations: Ints
-    """Boxes that were used, shape (o,)."""
+    """Number of boxes that were used, shape (o,)."""
     center_covariances: Floats
-    """Square meters, shape (o, 3, 3); NaN where unknown."""
+    """Square meters, shape (o, 3, 3); NaN if unknown."""
     log_semi_axes_sigmas: Floats
-    """Of the natural logarithms of the semi-axes, shape (o, 3); NaN where unknown."""
+    """Sigmas of the natural logarithms of the semi-axes, shape (o, 3); NaN if unknown."""
     dropped: Mapping[int, str] = field(default_factory=dict)
-    """Reason for each object that was not mapped, by its id."""
+    """Reasons why objects are not in the map, by their ids."""
 
     def __len__(self) -> int:
         """Return the number of objects."""
@@ -61,7 +61,7 @@ class MapObjects:
 
     @property
     def ellipsoids(self) -> Floats:
-        """Center and log-Cholesky shape, shape (o, 9); NaN where it is no ellipsoid."""
+        """Center and log-Cholesky shape, shape (o, 9); NaN for an object that is no ellipsoid."""
         rows = np.full((len(self), 9), np.nan)
         for row in np.flatnonzero(self.is_ellipsoid):
             axes, turn = self.semi_axes[row], self.orientations[row]
@@ -71,7 +71,7 @@ class MapObjects:
 
 @dataclass(frozen=True, eq=False)
 class Results:
-    """All files of an estimate."""
+    """The content of all files of an estimate."""
 
     directory: Path
     camera: _core.Camera
@@ -83,8 +83,10 @@ class Results:
     initial_poses: Floats
     """world_from_camera by odometry alone, shape (n, 7)."""
     covariances: Floats
-    """Of the poses in the frame of the camera, x y z [m] and rotation vector [rad], the first pose
-    being exact; shape (n, 6, 6), NaN where unknown."""
+    """Covariances of the poses in the frame of the camera, x y z [m] and rotation vector [rad].
+
+    Shape (n, 6, 6), NaN if unknown. The first pose is exact.
+    """
     objects: MapObjects
     boxes: BoxTable | None
     """The boxes, or None without ``boxes.csv``."""
@@ -98,13 +100,18 @@ class Results:
 
 
 def load_results(directory: str | Path) -> Results:
-    """Read a directory of results; FileError names what is missing or wrong, and its line.
+    """Read a directory of results.
 
     ``covariance.csv``, ``boxes.csv`` and ``report.json`` may be absent.
 
+    Raises
+    ------
+    FileError
+        If a file is missing or wrong; the error names it, and its line if it has lines.
+
     Examples
     --------
-    Names are those of an estimate, those of objects under ``objects``; poses are the camera's:
+    The names are those of an estimate. Objects are under ``objects``, and poses are the camera's:
 
     >>> import dqslam as dq
     >>> recording, truth = dq.simulate(dq.load_scenario("paper"), seed=7)
@@ -198,7 +205,7 @@ def _column(objects: list[dict[str, Any]], name: str) -> list[Any]:
 
 
 def _maybe(objects: list[dict[str, Any]], name: str, shape: tuple[int, ...]) -> Floats:
-    """Return a table of finite entries, and NaN where one is absent or null; (o, *shape)."""
+    """Return the finite entries, shape (o, *shape); NaN for one that is absent or null."""
     table = np.full((len(objects), *shape), np.nan)
     for row, entry in enumerate(objects):
         if entry.get(name) is not None:

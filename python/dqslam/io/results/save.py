@@ -39,21 +39,27 @@ def save_estimate(
 ) -> None:
     """Write an estimate into a directory, which is created if needed.
 
-    ``trajectory.txt`` has the estimated and ``odometry.txt`` the initial poses, world_from_camera;
-    ``map.json`` has the objects, and why others were dropped; ``camera.json`` the camera. Each file
-    is complete or absent.
+    ``trajectory.txt`` has the estimated poses and ``odometry.txt`` the initial poses, both
+    world_from_camera. ``map.json`` has the objects, and the reasons why others were dropped.
+    ``camera.json`` has the camera. Each file is complete or absent.
 
     Parameters
     ----------
     detections
-        Boxes for ``boxes.csv``, with flags of edges at the border. They are the boxes that the
-        estimator used, in the order of ``estimate.inliers``, and any others between them, which
-        were held out or have object -1.
+        Boxes for ``boxes.csv``. They are the boxes that the estimator used, in the order of
+        ``estimate.inliers``. Between them may be others, which were held out or have object -1.
     held_out
-        Whether each box was not given to the estimator, shape (m,); none by default.
+        Whether each box was held out from the estimator, shape (m,); by default none was.
     marginals
-        Covariances of the mapped objects, for the ellipsoid model, and of the poses, for
-        ``covariance.csv``.
+        Covariances of the poses, for ``covariance.csv``, and of the objects, which need the
+        ellipsoid model.
+
+    Raises
+    ------
+    ValueError
+        If detections or marginals do not fit the estimate.
+    OSError
+        If a file cannot be written.
 
     Examples
     --------
@@ -93,7 +99,7 @@ def _camera(camera: _core.Camera) -> dict[str, Any]:
 
 
 def _object(estimate: Estimate, row: int, marginals: Covariances | None) -> dict[str, Any]:
-    """Describe one object; a dual quadric that is not an ellipsoid has a center, but null axes."""
+    """Describe one object; the axes are null if its dual quadric is no ellipsoid."""
     semi_axes, orientation = None, None
     if estimate.is_ellipsoid[row]:
         _, semi_axes, orientation = _core.axes_from_ellipsoid(estimate.ellipsoids[row])

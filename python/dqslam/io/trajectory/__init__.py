@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dqslam import _core
-from dqslam.io.formats import Progress, choose_format, tell_nobody
+from dqslam.io.formats import Progress, choose_format, no_progress
 from dqslam.io.frames import FrameTimes
 from dqslam.io.rosbag import topic_option
 from dqslam.io.trajectory.euroc import EUROC
@@ -32,7 +32,7 @@ def read_trajectory(
     body_from_camera: ArrayLike | None = None,
     repeated_times: bool = False,
     topic: str | None = None,
-    progress: Progress = tell_nobody,
+    progress: Progress = no_progress,
 ) -> Trajectory:
     """Read a trajectory.
 

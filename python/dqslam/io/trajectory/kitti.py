@@ -31,7 +31,7 @@ def read_kitti(
     rows, lines = read_rows(path)
     if frames is None:
         raise FileError(
-            path, "kitti has no times: say them with --frame-times FILE or --frame-rate HZ"
+            path, "kitti has no times: give them with --frame-times FILE or --frame-rate HZ"
         )
     fields = [row.split() for row in rows]
     for row, line in zip(fields, lines, strict=True):

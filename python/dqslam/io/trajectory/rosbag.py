@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from dqslam.io.files import FileError
-from dqslam.io.formats import Format, Progress, tell_nobody
+from dqslam.io.formats import Format, Progress, no_progress
 from dqslam.io.frames import FrameTimes
 from dqslam.io.rosbag import LOOKS, NAME, looks_like_bag, messages, stamp_seconds
 from dqslam.io.trajectory.table import Trajectory, make_trajectory
@@ -26,7 +26,7 @@ def read_odometry(
     frames: FrameTimes | None = None,
     repeated_times: bool = False,
     topic: str | None = None,
-    progress: Progress = tell_nobody,
+    progress: Progress = no_progress,
 ) -> Trajectory:
     """Read the odometry of a bag; ``frames`` are not used, because it has times."""
     times, rows = [], []

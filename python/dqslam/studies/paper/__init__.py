@@ -2,12 +2,12 @@
 
 from dqslam.studies.paper.methods import LOSSES as LOSSES
 from dqslam.studies.paper.methods import ROWS as ROWS
-from dqslam.studies.paper.methods import Beliefs as Beliefs
+from dqslam.studies.paper.methods import Assumptions as Assumptions
 from dqslam.studies.paper.methods import LossName as LossName
 from dqslam.studies.paper.methods import Method as Method
 from dqslam.studies.paper.methods import RowName as RowName
 from dqslam.studies.paper.methods import Settings as Settings
-from dqslam.studies.paper.methods import beliefs as beliefs
+from dqslam.studies.paper.methods import assumptions_of as assumptions_of
 from dqslam.studies.paper.methods import default_loss as default_loss
 from dqslam.studies.paper.methods import method_options as method_options
 from dqslam.studies.paper.methods import seen_by as seen_by

@@ -20,12 +20,12 @@ LOSSES: tuple[LossName, ...] = get_args(LossName)
 ROWS: tuple[RowName, ...] = ("monocular", "relative_position")
 
 # No other loss has a lower mean RMSE_pos over seeds 0 to 19 with 20 % wrong ids, random and
-# structured; switchable constraints have the same.
+# structured. Switchable constraints have the same mean.
 ROBUST_LOSS: LossName = "gnc_gm"
 
 # The paper does not state the weight Lambda of its box residual. Every decade of its sigma, in
-# px^4 m^2, is tried: from values where boxes outweigh odometry, and the result is worse than
-# odometry, to values where boxes have no effect.
+# px^4 m^2, is tried. At the least value boxes outweigh odometry, and the result is worse than
+# odometry. At the largest value boxes have no effect.
 ALGEBRAIC_SIGMAS = tuple(float(10.0**power) for power in range(7, 15))
 
 
@@ -39,7 +39,7 @@ class Settings:
     """Whether estimates are compared with the posterior bound and the optimum."""
 
     def __post_init__(self) -> None:
-        """Refuse settings that do not go together."""
+        """Refuse settings that contradict each other."""
         if self.loss not in LOSSES:
             raise ValueError(f"loss: {self.loss!r} is none of {', '.join(LOSSES)}")
         if self.method == "paper" and (self.bound or self.loss != "none"):
@@ -53,7 +53,7 @@ def default_loss(scenario: Scenario, method: Method) -> LossName:
 
 
 def candidate_sigmas(method: Method) -> tuple[float | None, ...]:
-    """Return the algebraic sigmas that a method is run with; None if it has no such weight."""
+    """Return the algebraic sigmas to run a method with; one None if it has no such weight."""
     return ALGEBRAIC_SIGMAS if method == "paper" else (None,)
 
 
@@ -67,8 +67,8 @@ def method_options(settings: Settings, algebraic_sigma: float | None = None) -> 
         start=_core.Start.IDENTITY,
         schedule=_core.Schedule.BATCH,
         loss=_core.Loss.NONE,
-        # With Ceres' dog-leg, solves from odometry succeed on fewer drives than with our own, but
-        # here it is never worse than Levenberg-Marquardt, and it is faster.
+        # From odometry, the dog-leg of Ceres loses fewer drives than that of this library. It is
+        # never worse than Levenberg-Marquardt here, and it is faster.
         backend=_core.Backend.CERES,
         minimizer=_core.Minimizer.DOGLEG,
         algebraic_sigma=algebraic_sigma,
@@ -76,7 +76,7 @@ def method_options(settings: Settings, algebraic_sigma: float | None = None) -> 
 
 
 @dataclass(frozen=True)
-class Beliefs:
+class Assumptions:
     """The assumptions about boxes and objects."""
 
     box_noise: BoxNoise = field(default_factory=BoxNoise)
@@ -87,16 +87,16 @@ class Beliefs:
         return build_graph(recording, box_noise=self.box_noise, size_prior=self.size_prior)
 
 
-def beliefs(scenario: Scenario, settings: Settings) -> Beliefs:
+def assumptions_of(scenario: Scenario, settings: Settings) -> Assumptions:
     """Return the default assumptions, or the true ones if a bound needs them.
 
-    Covariances and their bound are only meaningful if the sigmas are right. For ellipsoids these
-    are the sigmas of the detector and of the world; for cubes there are no right ones.
+    Covariances and their bound are only meaningful with the right sigmas. For ellipsoids these
+    are the sigmas of the detector and of the world. For cubes there are no right sigmas.
     """
     if settings.bound and scenario.objects == "ellipsoids":
         noise = BoxNoise(pixels=scenario.detector.edge_sigma_px, relative=0.0)
-        return Beliefs(noise, true_size_prior(scenario.world))
-    return Beliefs()
+        return Assumptions(noise, true_size_prior(scenario.world))
+    return Assumptions()
 
 
 def true_size_prior(world: WorldSettings) -> SizePrior:
@@ -118,5 +118,5 @@ def true_size_prior(world: WorldSettings) -> SizePrior:
 
 
 def seen_by(row: RowName, recording: Recording) -> Recording:
-    """Return the recording that the estimator of a row gets."""
+    """Return the recording without the data that the estimator of a row does not use."""
     return recording if row == "relative_position" else replace(recording, positions=None)

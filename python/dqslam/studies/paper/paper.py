@@ -14,7 +14,7 @@ from dqslam.studies.paper.methods import (
     LossName,
     Method,
     Settings,
-    beliefs,
+    assumptions_of,
     default_loss,
     method_options,
     seen_by,
@@ -39,12 +39,12 @@ def run_paper(
     scheduler: str | None = None,
     progress: Progress | None = None,
 ) -> PaperTable:
-    """Run trials with seeds seed, seed + 1, ... and tabulate their errors.
+    """Run trials with the seeds seed, seed + 1 and so on, and tabulate their errors.
 
     Parameters
     ----------
     loss
-        The robust loss on boxes; by default none, or a suitable one if some ids are wrong.
+        The robust loss on boxes; by default "none", or "gnc_gm" if some ids are wrong.
     bound
         Whether to compare with the posterior bound and the optimum, which needs more solves.
         For ellipsoids, the estimator then uses the true noise of the boxes and the true spread
@@ -52,7 +52,7 @@ def run_paper(
     jobs, backend, scheduler
         Where trials run, as in `pool.run_each`. Only times depend on it.
     progress
-        Called with (trials done, trials) after each.
+        Called with (trials done, trials) after each trial.
     """
     for name, value, least in (("trials", trials, 1), ("seed", seed, 0)):
         if value < least:
@@ -77,11 +77,11 @@ def example_maps(table: PaperTable, count: int) -> list[tuple[str, Estimate, Tru
     """Solve the first successful monocular trials again: title, estimate and truth of each."""
     row = table.best("monocular")
     options = method_options(table.settings, row.algebraic_sigma)
-    believed = beliefs(table.scenario, table.settings)
+    assumptions = assumptions_of(table.scenario, table.settings)
     maps = []
     for seed in [seed for seed in table.seeds if seed not in row.failures][:count]:
         recording, truth = simulate(table.scenario, seed=seed)
-        estimate, _ = solve(believed.graph(seen_by("monocular", recording)), options)
+        estimate, _ = solve(assumptions.graph(seen_by("monocular", recording)), options)
         report = evaluate(estimate, truth)
         errors = f"odometry {report.odometry_rmse_pos:.2f} m, estimate {report.rmse_pos:.2f} m"
         maps.append((f"seed {seed}: {errors}", estimate, truth))

@@ -13,7 +13,7 @@ from dqslam.estimate import Estimate
 from dqslam.graph import Graph, solve
 from dqslam.metrics import mean_distance, position_error, true_rows
 from dqslam.recording import Recording, Truth
-from dqslam.studies.paper.methods import Beliefs
+from dqslam.studies.paper.methods import Assumptions
 from dqslam.uncertainty import (
     chi_square_interval,
     marginal_covariances,
@@ -28,10 +28,10 @@ SAME_COST = 0.05
 
 @dataclass(frozen=True)
 class BoundScore:
-    """An estimate compared with the best that the data allow."""
+    """An estimate compared with the posterior bound and the optimum."""
 
     bound: float
-    """Expected mean position error, meters."""
+    """Expected mean position error at the posterior bound, meters."""
     last_pose_nees: float
     """Squared error of the last pose in sigmas of its covariance, per degree of freedom."""
     pose_nees: float
@@ -45,18 +45,18 @@ class BoundScore:
 
 @dataclass(frozen=True)
 class RobustScore:
-    """How well wrong ids were recognized, and the errors of a run that knows the right ones."""
+    """How well wrong ids were recognized, and the errors of an oracle without the wrong boxes."""
 
     precision: float
-    """Share of the boxes called inliers whose id is right."""
+    """Share of the inliers whose id is right."""
     recall: float
-    """Share of the boxes with the right id that are called inliers."""
+    """Share of the boxes with the right id that are inliers."""
     oracle_rmse_pos: float
-    """Mean position error of the run that knows the right ids, meters."""
+    """Mean position error of the oracle, meters."""
     oracle_rmse_landmark: float
-    """Mean error of that run's centers, over the objects that the estimate also has, meters."""
+    """Mean error of the oracle's centers, over the objects that the estimate also has, meters."""
     dropped: int
-    """Objects that the estimate leaves out because too few boxes fit them."""
+    """Number of objects that the estimate leaves out because too few boxes fit them."""
 
 
 def score_bound(
@@ -90,27 +90,30 @@ def score_bound(
 def score_robust(
     right_graph: Graph, right: Bools, truth: Truth, estimate: Estimate, options: SolveOptions
 ) -> RobustScore:
-    """Score the inliers against the boxes with the right id (b,), with `options` of the oracle."""
+    """Compare the inliers with the boxes that have the right id, flags (b,), and run the oracle.
+
+    ``options`` are those of the oracle, which solves ``right_graph``.
+    """
     found = estimate.inliers & right
-    told, _ = solve(right_graph, options)
-    shared = told.object_ids[np.isin(told.object_ids, estimate.object_ids)]
-    told_centers = told.centers[np.isin(told.object_ids, shared)]
+    oracle, _ = solve(right_graph, options)
+    shared = oracle.object_ids[np.isin(oracle.object_ids, estimate.object_ids)]
+    oracle_centers = oracle.centers[np.isin(oracle.object_ids, shared)]
     return RobustScore(
         precision=float(found.sum() / max(estimate.inliers.sum(), 1)),
         recall=float(found.sum() / max(right.sum(), 1)),
-        oracle_rmse_pos=position_error(truth.pose_model, told.poses, truth.poses),
-        oracle_rmse_landmark=mean_distance(told_centers, truth.center[true_rows(shared, truth)]),
+        oracle_rmse_pos=position_error(truth.pose_model, oracle.poses, truth.poses),
+        oracle_rmse_landmark=mean_distance(oracle_centers, truth.center[true_rows(shared, truth)]),
         dropped=len(estimate.dropped),
     )
 
 
-def right_graph_of(recording: Recording, right: Bools, believed: Beliefs) -> Graph:
+def right_graph_of(recording: Recording, right: Bools, assumptions: Assumptions) -> Graph:
     """Return the problem of the boxes that have the right id (b,)."""
     detections = recording.detections.select(right)
     positions = recording.positions
     if positions is not None:
         positions = positions.select(np.isin(positions.object_id, detections.object_id))
-    return believed.graph(replace(recording, detections=detections, positions=positions))
+    return assumptions.graph(replace(recording, detections=detections, positions=positions))
 
 
 def summarize_bound(scores: Sequence[BoundScore], rmse_pos: Sequence[float]) -> dict[str, Any]:

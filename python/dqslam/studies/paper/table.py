@@ -95,7 +95,7 @@ class PaperTable:
         return self.settings.method
 
     def best(self, row: RowName) -> TableRow:
-        """Return the row with the fewest failures, and of equals the least mean RMSE_pos."""
+        """Return the row with the fewest failures, and among these with the least mean RMSE_pos."""
         return min(
             self.scan[row],
             key=lambda one: (
@@ -126,7 +126,7 @@ class PaperTable:
         return table
 
     def save(self, path: str | Path) -> None:
-        """Write the table as JSON, whole or not at all."""
+        """Write the table as JSON; the file is complete or absent."""
         write_json(path, self.as_dict())
 
 
@@ -190,7 +190,6 @@ def _scores(solves: Sequence[ScoredSolve]) -> dict[str, Any]:
         scores["inlier_precision"] = float(np.mean([score.precision for score in robust]))
         scores["inlier_recall"] = float(np.mean([score.recall for score in robust]))
         for name in ("oracle_rmse_pos", "oracle_rmse_landmark"):
-            told = Statistics.of([getattr(score, name) for score in robust])
-            scores[name] = asdict(told)
+            scores[name] = asdict(Statistics.of([getattr(score, name) for score in robust]))
         scores["objects_dropped"] = float(np.mean([score.dropped for score in robust]))
     return scores

@@ -12,10 +12,10 @@ from dqslam.simulation.scenario import Scenario
 from dqslam.simulation.simulator import simulate
 from dqslam.studies.paper.methods import (
     ROWS,
-    Beliefs,
+    Assumptions,
     RowName,
     Settings,
-    beliefs,
+    assumptions_of,
     candidate_sigmas,
     method_options,
     seen_by,
@@ -31,7 +31,7 @@ from dqslam.studies.paper.scores import (
 
 @dataclass(frozen=True)
 class ScoredSolve:
-    """One solve of one trial: a report, or why there is none."""
+    """One solve of one trial: a report, or the reason why there is none."""
 
     report: Report | None
     seconds: float
@@ -56,11 +56,11 @@ class PaperTrial:
 
 
 def run_trial(scenario: Scenario, seed: int, settings: Settings) -> PaperTrial:
-    """Simulate one seed and solve each row with each sigma; a solve may fail, and is kept."""
+    """Simulate one seed, and solve each row with each sigma; failed solves are kept."""
     recording, truth = simulate(scenario, seed=seed)
     odometry = recording.odometry
     poses = _core.dead_reckon(odometry.pose_model, odometry.first_pose, odometry.relative)
-    believed = beliefs(scenario, settings)
+    assumptions = assumptions_of(scenario, settings)
     return PaperTrial(
         seed=seed,
         odometry_rmse_pos=position_error(truth.pose_model, poses, truth.poses),
@@ -69,9 +69,9 @@ def run_trial(scenario: Scenario, seed: int, settings: Settings) -> PaperTrial:
                 solve_and_score(
                     seen_by(row, recording),
                     truth,
-                    believed,
+                    assumptions,
                     method_options(settings, sigma),
-                    told=method_options(Settings(settings.method), sigma),
+                    oracle_options=method_options(Settings(settings.method), sigma),
                     bound=settings.bound,
                 )
                 for sigma in candidate_sigmas(settings.method)
@@ -84,35 +84,35 @@ def run_trial(scenario: Scenario, seed: int, settings: Settings) -> PaperTrial:
 def solve_and_score(
     recording: Recording,
     truth: Truth,
-    believed: Beliefs,
+    assumptions: Assumptions,
     options: SolveOptions,
     *,
-    told: SolveOptions,
+    oracle_options: SolveOptions,
     bound: bool,
 ) -> ScoredSolve:
-    """Solve what an estimator is given and compare it with the truth.
+    """Solve a recording and compare the estimate with the truth.
 
     Parameters
     ----------
-    told
-        If some ids are wrong: options of the run that knows the right ones and has no loss.
+    oracle_options
+        Options of the oracle, which has no loss and runs if some ids are wrong.
     bound
-        Whether to compare with the posterior bound and the optimum too.
+        Whether to compare with the posterior bound and the optimum as well.
     """
     start = time.perf_counter()
     seconds = None
     try:
-        graph = believed.graph(recording)
+        graph = assumptions.graph(recording)
         solved = solve(graph, options)
         seconds = time.perf_counter() - start
         report = evaluate(solved[0], truth)
         right = recording.detections.object_id == truth.box_object_id
-        right_graph = graph if right.all() else right_graph_of(recording, right, believed)
+        right_graph = graph if right.all() else right_graph_of(recording, right, assumptions)
         score = robust = None
         if bound:
             score = score_bound(graph, right_graph, truth, solved, options)
         if not right.all():
-            robust = score_robust(right_graph, right, truth, solved[0], told)
+            robust = score_robust(right_graph, right, truth, solved[0], oracle_options)
         summary = solved[1]
         return ScoredSolve(
             report,

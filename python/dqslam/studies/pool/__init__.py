@@ -1,6 +1,6 @@
 """Process many items in this process, in other processes of this machine, or on a cluster.
 
-The result of an item must not depend on where it runs; then all backends give the same results.
+The result of an item must not depend on where it runs. Then all backends give the same results.
 """
 
 import os
@@ -25,22 +25,22 @@ def run_each(
     backend: Backend | None = None,
     scheduler: str | None = None,
 ) -> Generator[Result, None, None]:
-    """Return a generator of function(item) for all items, each once, in the order they finish.
+    """Return a generator of function(item) for all items, in the order in which they finish.
 
-    Closing it (`contextlib.closing`) stops at once; so do an error and Ctrl-C.
+    Closing the generator (`contextlib.closing`), an error and Ctrl-C stop the work at once.
 
     Parameters
     ----------
     function
-        It must be picklable and in a module that the other processes can import, unless it runs
-        in this process.
+        A function that can be pickled, of a module that the other processes can import. With
+        "serial", any function.
     jobs
         Number of processes on this machine, by default one per core. It does not apply to a
         cluster.
     backend
         "serial" runs in this process, "processes" in others by the standard library, "loky" in
-        others by joblib, "dask" and "ray" on a cluster. The default is "loky" if joblib is
-        installed, else "processes".
+        others by joblib, "dask" and "ray" on a cluster. The default is "serial" for one job, else
+        "loky" if joblib is installed, else "processes".
     scheduler
         Address of the cluster: tcp://host:8786 for dask, or an address for `ray.init`. Without
         it, a cluster is started on this machine.
@@ -57,7 +57,7 @@ def run_each(
     if backend not in BACKENDS:
         raise ValueError(f"backend: {backend!r} is none of {', '.join(BACKENDS)}")
     if scheduler is not None and backend in _LOCAL:
-        raise ValueError(f"scheduler: backend {backend} has none; say dask or ray")
+        raise ValueError(f"scheduler: backend {backend} has none; choose dask or ray")
     if (needed := _NEEDS.get(backend)) is not None and find_spec(needed) is None:
         extra = "ray" if backend == "ray" else "'dqslam[cluster]'"
         raise ValueError(f"backend: {backend} needs {needed}, missing: pip install {extra}")

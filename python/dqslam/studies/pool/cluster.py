@@ -10,8 +10,8 @@ from dqslam.studies.pool.processes import interrupts_held
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
-# Results of ray come in chunks. A chunk is so long that workers seldom wait for its last item, and
-# so short that a sweep which is stopped loses little.
+# Results of ray arrive in chunks. With long chunks, workers seldom wait for the last item. With
+# short chunks, a sweep that is stopped loses little.
 _RAY_CHUNK = 8  # items of each processor
 
 
@@ -26,9 +26,9 @@ def run_in_dask(
     Raises
     ------
     ValueError
-        When no scheduler answers.
+        If no scheduler answers.
     RuntimeError
-        When an item has ended several workers.
+        If an item has ended several workers.
     """
     from distributed import Client, KilledWorker, LocalCluster, as_completed
 
@@ -60,7 +60,7 @@ def run_in_ray(
 ) -> Generator[Result, None, None]:
     """Yield results of the cluster at an address, or of this machine, by joblib's backend for ray.
 
-    Its results come in chunks, in the order of the items.
+    Results arrive in chunks, in the order of the items.
     """
     import ray
     from joblib import Parallel, delayed, effective_n_jobs, parallel_config

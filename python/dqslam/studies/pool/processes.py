@@ -1,4 +1,4 @@
-"""Items in processes of this machine, with nothing but the standard library."""
+"""Items in processes of this machine, by the standard library alone."""
 
 import multiprocessing.resource_tracker
 import os
@@ -13,7 +13,7 @@ from typing import TypeVar
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
-# Items already run in parallel, so threads within them would only slow each other down.
+# Items already run in parallel. More threads would only slow each other down.
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
 

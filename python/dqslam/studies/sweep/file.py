@@ -51,7 +51,7 @@ class Sweep:
 
 
 class _File(FileModel):
-    """The settings at the top of a file; its tables are checked setting by setting."""
+    """The settings at the top of a file. Its tables are checked setting by setting."""
 
     scenario: str
     trials: Annotated[int, Field(ge=1)] = 50
@@ -59,8 +59,9 @@ class _File(FileModel):
     seed: Annotated[int, Field(ge=0)] = 0
     """The first seed."""
     bound: bool = False
+    """Whether to compare with the posterior bound and the optimum."""
     samples: Annotated[int, Field(ge=1)] = 1
-    """Number of random samples, each combined with the whole grid."""
+    """Number of random samples, each combined with every cell of the grid."""
     sample_seed: Annotated[int, Field(ge=0)] = 0
     fixed: dict[str, Any] = {}
     grid: dict[str, Any] = {}
@@ -78,19 +79,19 @@ def load_sweep(path: str | Path) -> Sweep:
     """
     file = read_toml(path)
     mistakes: list[FileError] = []
-    said = _top(file, mistakes)
-    scenario = _scenario(file, said, mistakes)
+    top = _top(file, mistakes)
+    scenario = _scenario(file, top, mistakes)
     fixed = {
-        name: [Value(location, value)] for name, location, value in leaves(("fixed",), said.fixed)
+        name: [Value(location, value)] for name, location, value in leaves(("fixed",), top.fixed)
     }
-    grid = read_grid(file, said.grid, mistakes)
-    random = read_random(file, said.random, mistakes, samples=said.samples, seed=said.sample_seed)
+    grid = read_grid(file, top.grid, mistakes)
+    random = read_random(file, top.random, mistakes, samples=top.samples, seed=top.sample_seed)
     refuse_twice(file, (fixed, grid, random), mistakes)
-    _refuse_unknown(file, scenario, said, mistakes)
+    _refuse_unknown(file, scenario, top, mistakes)
     cells = []
-    for values, places in combinations(said.samples, fixed, grid, random):
+    for values, places in combinations(top.samples, fixed, grid, random):
         try:
-            content, as_cell = _cell(file, said, scenario, values, places)
+            content, as_cell = _cell(file, top, scenario, values, places)
             settings = check_model(TrialSettings, content, as_cell)
         except FileErrors as error:
             mistakes += error.errors
@@ -99,11 +100,11 @@ def load_sweep(path: str | Path) -> Sweep:
             cells.append(Cell(varied, settings))
     if mistakes or scenario is None:  # a wrong value makes a mistake in each cell
         raise FileErrors(list({str(mistake): mistake for mistake in mistakes}.values()))
-    return Sweep(scenario.name, tuple(cells), tuple(range(said.seed, said.seed + said.trials)))
+    return Sweep(scenario.name, tuple(cells), tuple(range(top.seed, top.seed + top.trials)))
 
 
 def _top(file: TomlFile, mistakes: list[FileError]) -> _File:
-    """Check the top; a default replaces a wrong setting, so that the rest is checked too."""
+    """Check the top; a default replaces a wrong setting, so that the other ones are checked too."""
     try:
         return check_model(_File, file.content, file)
     except FileErrors as error:
@@ -111,13 +112,13 @@ def _top(file: TomlFile, mistakes: list[FileError]) -> _File:
         return _File.model_validate({"scenario": ""} | right_keys(_File, file.content))
 
 
-def _scenario(file: TomlFile, said: _File, mistakes: list[FileError]) -> Scenario | None:
+def _scenario(file: TomlFile, top: _File, mistakes: list[FileError]) -> Scenario | None:
     """Load the scenario; return None if it is wrong."""
     if not isinstance(file.content.get("scenario"), str):
         return None  # the mistake at the top is reported already
-    beside = file.path.parent / said.scenario
+    beside = file.path.parent / top.scenario
     try:
-        return load_scenario(beside if beside.is_file() else said.scenario)
+        return load_scenario(beside if beside.is_file() else top.scenario)
     except FileNotFoundError as error:
         mistakes.append(file.error(("scenario",), f"scenario: {error}"))
     except FileErrors as error:
@@ -128,18 +129,18 @@ def _scenario(file: TomlFile, said: _File, mistakes: list[FileError]) -> Scenari
 
 
 def _refuse_unknown(
-    file: TomlFile, scenario: Scenario | None, said: _File, mistakes: list[FileError]
+    file: TomlFile, scenario: Scenario | None, top: _File, mistakes: list[FileError]
 ) -> None:
     """Refuse misspelled names that are in no cell because their values are wrong too."""
     for table in ("grid", "random"):
-        for name, place, value in leaves((table,), getattr(said, table)):
-            content, as_cell = _cell(file, said, scenario, {name: value}, {name: place})
+        for name, place, value in leaves((table,), getattr(top, table)):
+            content, as_cell = _cell(file, top, scenario, {name: value}, {name: place})
             mistakes += unknown_keys(TrialSettings, content, as_cell)
 
 
 def _cell(
     file: TomlFile,
-    said: _File,
+    top: _File,
     scenario: Scenario | None,
     values: Mapping[str, Any],
     places: Mapping[str, Location],
@@ -154,7 +155,7 @@ def _cell(
     content: dict[str, Any] = {
         "scenario": scenario.model_dump(),
         "estimator": {},
-        "bound": said.bound,
+        "bound": top.bound,
     }
     lines: dict[Location, int] = {}
     if ("bound",) in file.lines:

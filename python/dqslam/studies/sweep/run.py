@@ -1,4 +1,4 @@
-"""Run the missing trials of a sweep, and tabulate all of it."""
+"""Run the missing trials of a sweep, and tabulate all trials."""
 
 from collections.abc import Callable
 from contextlib import closing
@@ -41,7 +41,7 @@ def run_sweep(
     scheduler: str | None = None,
     progress: Progress | None = None,
 ) -> SweepRun:
-    """Run each trial of a sweep that is not in the folder yet, store it there, and tabulate all.
+    """Run each trial of a sweep that the folder does not have, store it, and tabulate all trials.
 
     If it is stopped or killed, the next call continues. After a change of the file, only new trials
     are run; trials that the file no longer has remain in the folder, but are not tabulated.
@@ -49,11 +49,12 @@ def run_sweep(
     Parameters
     ----------
     folder
-        Where trials, results.csv, results.parquet (where pyarrow is installed) and summary.json go.
+        Folder of the trials, results.csv, summary.json, and results.parquet if pyarrow is
+        installed.
     jobs, backend, scheduler
         Where trials run, as in `pool.run_each`. The results do not depend on it.
     progress
-        Called with (trials finished, trials) after each; trials of earlier runs count.
+        Called with (trials finished, trials) after each trial; trials of earlier runs count.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The settings of a trial of a sweep: a scenario, and an estimator, as a file has them."""
+"""The settings of a trial of a sweep, as in a file: a scenario and an estimator."""
 
 from dataclasses import asdict
 from enum import Enum
@@ -11,12 +11,12 @@ from dqslam._core import SolveOptions
 from dqslam.assumptions import BoxNoise, SizePrior
 from dqslam.simulation.scenario import Scenario
 from dqslam.studies.paper import (
-    Beliefs,
+    Assumptions,
     LossName,
     Method,
     RowName,
     Settings,
-    beliefs,
+    assumptions_of,
     default_loss,
     method_options,
 )
@@ -27,7 +27,7 @@ class _Settings(BaseModel):
 
 
 class BoxNoiseSettings(_Settings):
-    """The settings of `BoxNoise` in a file; the defaults are its own."""
+    """The settings of `BoxNoise` in a file, with the same defaults."""
 
     pixels: Annotated[float, Field(gt=0.0)] = BoxNoise.pixels
     relative: Annotated[float, Field(ge=0.0)] = BoxNoise.relative
@@ -45,7 +45,7 @@ class SizePriorSettings(_Settings):
 class _Estimator(_Settings):
     method: Method = "dqslam"
     input: RowName = "monocular"
-    """Whether the estimator gets boxes alone, or measured positions of the objects too."""
+    """Whether the estimator gets boxes alone, or also measured positions of the objects."""
     box_noise: BoxNoiseSettings | None = None
     size_prior: SizePriorSettings | None = None
 
@@ -110,11 +110,11 @@ class TrialSettings(_Settings):
                 setattr(options, name, kind[value.upper()] if issubclass(kind, Enum) else value)
         return options
 
-    def believed(self) -> Beliefs:
+    def assumptions(self) -> Assumptions:
         """Return the assumptions about boxes and objects."""
-        default = beliefs(self.scenario, Settings(self.estimator.method, bound=self.bound))
+        default = assumptions_of(self.scenario, Settings(self.estimator.method, bound=self.bound))
         noise, prior = self.estimator.box_noise, self.estimator.size_prior
-        return Beliefs(
+        return Assumptions(
             default.box_noise if noise is None else BoxNoise(noise.pixels, noise.relative),
             default.size_prior
             if prior is None
@@ -122,14 +122,14 @@ class TrialSettings(_Settings):
         )
 
     def in_full(self) -> dict[str, Any]:
-        """Return every setting that a trial's outcome depends on, defaults too, as plain data."""
+        """Return every setting that the result of a trial depends on, including defaults."""
         options = self.options()
         return {
             "scenario": self.scenario.model_dump(mode="json", exclude={"name"}),
             "estimator": {
                 "method": self.estimator.method,
                 "input": self.estimator.input,
-                **asdict(self.believed()),
+                **asdict(self.assumptions()),
                 **{name: _plain(getattr(options, name)) for name in _SOLVER_NAMES},
             },
             "bound": self.bound,

@@ -18,7 +18,7 @@ from dqslam.studies.sweep.trial import TrialResult
 class Store:
     """Finished trials in a directory.
 
-    A trial depends only on the parts of its file name, so writing it again writes the same.
+    A trial depends only on the parts of its file name. Writing it again writes the same content.
     """
 
     def __init__(self, folder: str | Path) -> None:
@@ -30,7 +30,7 @@ class Store:
             raise FileError(folder, f"cannot be written: {error.strerror}") from None
 
     def describe_cell(self, key: str, settings: TrialSettings) -> None:
-        """Write the settings of a cell, unless they are there."""
+        """Write the settings of a cell, unless the file exists."""
         path = self.folder / "cells" / f"{key}.json"
         if not path.exists():
             write_json(path, {"scenario_name": settings.scenario.name} | settings.in_full())
@@ -40,7 +40,7 @@ class Store:
         write_json(self._path(result.key), asdict(result))
 
     def finished(self, keys: Collection[str]) -> dict[str, TrialResult]:
-        """Return the finished ones of some trials; a trial that cannot be read is not finished.
+        """Return those of some trials that are finished; a trial that cannot be read is not.
 
         Raises
         ------

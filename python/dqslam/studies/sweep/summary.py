@@ -97,7 +97,7 @@ class SweepSummary:
         }
 
     def save(self, path: str | Path) -> None:
-        """Write the summary as JSON, whole or not at all."""
+        """Write the summary as JSON; the file is complete or absent."""
         write_json(path, self.as_dict())
 
 

@@ -12,7 +12,7 @@ from dqslam.simulation.simulator import simulate
 from dqslam.studies.paper import ScoredSolve, seen_by, solve_and_score
 from dqslam.studies.sweep.settings import TrialSettings
 
-# The metrics of a trial with their units; "" is for a share, a count, or yes and no as 1 and 0.
+# The metrics of a trial with their units. "" is for a share, a count, or 1 and 0 for yes and no.
 METRICS = {
     "odometry_rmse_pos": "m",
     "rmse_pos": "m",
@@ -23,14 +23,14 @@ METRICS = {
     "iterations": "",
     "converged": "",
     "worse_than_odometry": "",
-    # with `bound`
+    # Only with `bound`.
     "bound": "m",
     "error_over_bound": "",
     "last_pose_nees": "",
     "pose_nees": "",
     "center_nees": "",
     "is_optimum": "",
-    # where ids are wrong
+    # Only if ids are wrong.
     "inlier_precision": "",
     "inlier_recall": "",
     "oracle_rmse_pos": "m",
@@ -52,7 +52,7 @@ class Task:
 
 @dataclass(frozen=True)
 class TrialResult:
-    """The result of a trial; all but the time is the same wherever it runs."""
+    """The result of a trial. Only the time depends on where it runs."""
 
     key: str
     seed: int
@@ -86,15 +86,17 @@ def run_task(task: Task) -> TrialResult:
         solved = solve_and_score(
             seen_by(task.settings.input, recording),
             truth,
-            task.settings.believed(),
+            task.settings.assumptions(),
             task.settings.options(),
-            told=task.settings.options(loss="none"),
+            oracle_options=task.settings.options(loss="none"),
             bound=task.settings.bound,
         )
         failure = solved.failure
         if not failure:
             metrics = _metrics(solved)
-    except Exception as error:  # of simulation, say: a world without a single box
+    except (
+        Exception
+    ) as error:  # also of the simulation, for example in a world without a single box
         failure = f"{type(error).__name__}: {error}"
     seconds = time.perf_counter() - start
     return TrialResult(task.key, task.seed, version(), seconds, metrics, failure)
@@ -102,7 +104,7 @@ def run_task(task: Task) -> TrialResult:
 
 def _metrics(solved: ScoredSolve) -> dict[str, float | None]:
     report, bound, robust = solved.report, solved.bound, solved.robust
-    assert report is not None  # there is one where there is no failure
+    assert report is not None  # a solve without a failure has one
     volumes = report.volume_relative_errors
     found: dict[str, float] = {
         "odometry_rmse_pos": report.odometry_rmse_pos,

@@ -95,7 +95,7 @@ def read_grid(file: TomlFile, table: Mapping[str, Any], mistakes: list[FileError
             continue
         for index, value in enumerate(values):
             if value in values[:index]:
-                mistakes.append(file.error((*location, index), f"{name}: {value!r} stands twice"))
+                mistakes.append(file.error((*location, index), f"{name}: {value!r} occurs twice"))
         grid[name] = [Value((*location, index), value) for index, value in enumerate(values)]
     return grid
 
