@@ -104,6 +104,7 @@ TEST_F(SolveFailures, SaysThatNoStepWasGood) {
       Sphere(camera + 100 * (center - camera), std::exp(graph.size_prior.log_mean[0]));
 
   options_.mode = Mode::kMapping;
+  options_.loss = Loss::kNone;
   options_.residual = Residual::kBox;
   options_.max_iterations = 1;
   const Solution solution = Solve(graph, options_, start);
@@ -122,6 +123,9 @@ TEST_F(SolveFailures, SaysThatTheStartIsUndefined) {
   options_.start = Start::kIdentity;
   options_.landmark_model = LandmarkModel::kDualQuadric;
   options_.schedule = Schedule::kBatch;
+  EXPECT_THAT(Solve(scene_.graph, options_, {}).summary.message,
+              HasSubstr("100 % of the boxes do not fit"));
+  options_.loss = Loss::kNone;
   const Solution solution = Solve(scene_.graph, options_, {});
   EXPECT_FALSE(solution.summary.converged);
   EXPECT_THAT(solution.summary.message, HasSubstr("undefined at the start"));

@@ -72,7 +72,6 @@ TYPED_TEST(SolveOf, RecoversTheTruthByDefault) {
   EXPECT_LT((solution.landmarks - this->scene_.truth.landmarks).cwiseAbs().maxCoeff(), 1e-6);
   EXPECT_TRUE(solution.summary.converged) << ToString(solution.summary);
   EXPECT_LT(solution.summary.final_cost, 1e-7);
-  EXPECT_GT(solution.summary.initial_cost, 1);
 }
 
 // Only the initial poses are wrong, by meters at the end of the loop; every start and minimizer.
@@ -166,6 +165,7 @@ class SolveTest : public testing::Test {
   /// Cost at the truth.
   double CostAtTruth(const Graph& graph) {
     options_.max_iterations = 1;
+    if (options_.loss == Loss::kGncTls) options_.loss = Loss::kNone;
     return Solve(graph, options_, scene_.truth).summary.initial_cost;
   }
 

@@ -90,6 +90,7 @@ TEST(TruncatedBoxes, DoNotPullObjects) {
   const auto center_error = [&] {
     SolveOptions options;
     options.mode = Mode::kMapping;
+    options.loss = Loss::kNone;
     const Solution solution = Solve(scene.graph, options, {});
     return (solution.landmarks - scene.truth.landmarks).leftCols<3>().rowwise().norm().maxCoeff();
   };

@@ -54,7 +54,7 @@ class Solver {
 
   /// Why a state cannot be the answer, in words; empty if nothing speaks against it.
   std::string Objection(const State& state) const {
-    if (!Refines()) return "";
+    if (IsAlgebraic(options_.residual)) return "";
     const Mask inliers = FitsAt(state, kBoxChiSquare999);
     const double misfits = 1.0 - inliers.cast<double>().mean();
     if (misfits > kMostMisfits) {
@@ -62,12 +62,10 @@ class Solver {
              " % of the boxes do not fit";
     }
     if (IsTorn(prepared_, state)) return "the path does not fit the odometry";
+    if (IsRobust(options_.loss)) return "";
     const std::vector<bool> stuck = StuckObjects(context_, BatchStage(context_), state);
     const auto count = std::count(stuck.begin(), stuck.end(), true);
-    if (!IsRobust(options_.loss) && count > 0) {
-      return std::to_string(count) + " objects do not fit their boxes";
-    }
-    return "";
+    return count > 0 ? std::to_string(count) + " objects do not fit their boxes" : "";
   }
 
   /// The cost by which attempts are compared: that of the boxes that fit, and the threshold for
