@@ -506,6 +506,13 @@ class SolveOptions:
     @function_tolerance.setter
     def function_tolerance(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
     @property
+    def grow_angle(self) -> float:
+        """
+        GROW adds more than grow_poses poses as long as odometry predicts the directions of objects with at most this sigma, in radians.
+        """
+    @grow_angle.setter
+    def grow_angle(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
     def grow_iterations(self) -> int:
         """
         The largest number of Levenberg-Marquardt iterations after each addition.
@@ -526,13 +533,6 @@ class SolveOptions:
         """
     @grow_poses.setter
     def grow_poses(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    @property
-    def grow_rotation(self) -> float:
-        """
-        GROW adds more than grow_poses poses as long as the sigma of odometry's rotation over the added poses is at most this, in radians.
-        """
-    @grow_rotation.setter
-    def grow_rotation(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
     @property
     def grow_tolerance(self) -> float:
         """
@@ -643,7 +643,7 @@ class Summary:
     @property
     def converged(self) -> bool:
         """
-        Whether the last stage met a stopping test and accepted a step.
+        Whether the last stage met a stopping test, with no decrease of the cost left that its model sees, and nothing speaks against the result: the boxes fit, and so does the odometry.
         """
     @property
     def evaluation_seconds(self) -> float:
@@ -683,7 +683,7 @@ class Summary:
     @property
     def message(self) -> str:
         """
-        The reason why the last stage ended.
+        The reason why the last stage ended, or what speaks against the result.
         """
     @property
     def rejected_steps(self) -> int:

@@ -11,6 +11,8 @@ from dqslam.assumptions import BoxNoise, SizePrior, SizePriors
 from dqslam.estimate import Estimate
 from dqslam.recording import Detections, Measurements, Recording
 
+# Where at least this share of all boxes fit, no box is suspected to show something else.
+TRUSTED_SHARE = 0.99
 # With only two boxes, an object's distance and size cannot be separated.
 FEWEST_INLIER_VIEWS = 3
 # A few boxes fit some ellipsoid even if all of them are wrong. Therefore at least this number of
@@ -183,13 +185,13 @@ def solve(
 
 def _unfit(graph: Graph, inliers: Bools) -> dict[int, str]:
     """Return the objects that too few boxes fit, with the reason by id."""
+    if inliers.mean() > TRUSTED_SHARE:
+        return {}
     views = _inlier_views(graph.core, inliers)
     fit = np.bincount(graph.core.boxes.object[inliers], minlength=len(views))
     needed = np.ceil(np.minimum(ENOUGH_INLIERS, ENOUGH_INLIER_SHARE * graph.observations))
     reasons = {}
     for row, object_id in enumerate(graph.object_ids.tolist()):
-        if fit[row] == graph.observations[row]:
-            continue
         if views[row] < FEWEST_INLIER_VIEWS:
             reasons[object_id] = (
                 f"seen in {views[row]} poses by boxes that fit, {FEWEST_INLIER_VIEWS} are needed"

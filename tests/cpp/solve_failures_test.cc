@@ -123,6 +123,7 @@ TEST_F(SolveFailures, SaysThatTheStartIsUndefined) {
   options_.start = Start::kIdentity;
   options_.landmark_model = LandmarkModel::kDualQuadric;
   options_.schedule = Schedule::kBatch;
+  options_.residual = Residual::kTangent;
   EXPECT_THAT(Solve(scene_.graph, options_, {}).summary.message,
               HasSubstr("100 % of the boxes do not fit"));
   options_.loss = Loss::kNone;

@@ -7,7 +7,7 @@ import pytest
 from benchmarks.problems import chain, paper
 
 import dqslam as dq
-from dqslam import _core
+from dqslam import Loss, SolveOptions, _core
 from dqslam.assumptions import BoxNoise
 from dqslam.graph import build_graph, solve
 from dqslam.online import Motion, OnlineSlam, StepBoxes, StepError, StepPositions, replay, steps_of
@@ -76,7 +76,7 @@ def test_one_box_puts_a_sphere_where_its_size_says(problem):
 
 def test_a_polish_finds_what_solve_finds(problem):
     graph = build_graph(problem.recording, box_noise=NOISE)
-    estimate, summary = solve(graph)
+    estimate, summary = solve(graph, SolveOptions(loss=Loss.NONE))
     slam = fed(problem)
     polished = slam.polish().result()
     assert polished.cost == pytest.approx(summary.final_cost, rel=1e-6)
@@ -102,8 +102,9 @@ def test_ranges_reach_a_session_as_they_reach_solve(problem):
         np.full((3, 1, 1), 0.02**2),
     )
     recording = replace(problem.recording, positions=None, measurements=(ranges,))
-    _, summary = solve(build_graph(recording, box_noise=NOISE))
-    _, without = solve(build_graph(replace(recording, measurements=()), box_noise=NOISE))
+    plain = SolveOptions(loss=Loss.NONE)
+    _, summary = solve(build_graph(recording, box_noise=NOISE), plain)
+    _, without = solve(build_graph(replace(recording, measurements=()), box_noise=NOISE), plain)
     assert summary.final_cost > without.final_cost + 1.0
     slam = OnlineSlam(recording.camera, box_noise=NOISE)
     assert len(list(replay(slam, recording))) == len(recording.timestamps)

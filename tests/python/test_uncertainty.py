@@ -117,7 +117,9 @@ def test_dropped_objects_take_no_part():
     last = np.flatnonzero(detections.object_id == detections.object_id.max())
     kept = np.ones(len(detections), dtype=bool)
     kept[last[2:]] = False
-    part = replace(recording, detections=detections.select(kept))
+    box = detections.box.copy()
+    box[np.flatnonzero(detections.object_id == detections.object_id.min())[::5]] += 150.0  # wrong
+    part = replace(recording, detections=replace(detections, box=box).select(kept))
     options = SolveOptions(loss=Loss.CAUCHY)
     graph = build_graph(part)
     estimate, _ = solve(graph, options)

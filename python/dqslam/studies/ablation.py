@@ -130,7 +130,7 @@ class _Problem:
         )
         if not same:
             rows = np.searchsorted(self.graph_of(variant).object_ids, self.right_graph.object_ids)
-            local = SolveOptions(residual=Residual.BOX, schedule=Schedule.BATCH)
+            local = SolveOptions(residual=Residual.BOX, schedule=Schedule.BATCH, loss=Loss.NONE)
             try:
                 quadrics = solution.dual_quadrics[rows]
                 ellipsoids = [_core.ellipsoid_from_dual_quadric(q) for q in quadrics]
@@ -274,7 +274,7 @@ def _problem(
         recording, _ = simulate(scenario.model_copy(update={"detector": detector}), seed=seed)
         right = recording.detections.object_id == clean.detections.object_id
     right_graph = _graph(replace(recording, detections=recording.detections.select(right)))
-    options = SolveOptions()
+    options = SolveOptions(loss=Loss.NONE)
     best = _core.solve(right_graph.core, options, true_state(right_graph, truth, options))
     return _Problem(
         graph=_graph(recording),
