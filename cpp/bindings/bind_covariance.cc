@@ -3,6 +3,7 @@
 #include <pybind11/stl.h>
 
 #include "bindings.h"
+#include "dqslam/estimation/calibration.h"
 #include "dqslam/estimation/covariance.h"
 
 namespace py = pybind11;
@@ -74,6 +75,40 @@ void BindCovariance(py::module_& m) {
         py::call_guard<py::gil_scoped_release>(),
         "Residuals and leverage of odometry and boxes, from which variance components are "
         "estimated.");
+
+  py::class_<CalibrationParameter>(
+      m, "CalibrationParameter", "A deviation from what a graph takes for known.")
+      .def_readonly("name", &CalibrationParameter::name, "What it is.")
+      .def_readonly("unit", &CalibrationParameter::unit, "Its unit, empty for a share.");
+  py::class_<CalibrationScore>(m, "CalibrationScore", "Score tests of the calibration.")
+      .def_readonly("score", &CalibrationScore::score, "Scores, shape (p,).")
+      .def_readonly("information", &CalibrationScore::information, "Information, shape (p, p).")
+      .def_readonly("unchecked",
+                    &CalibrationScore::unchecked,
+                    "Information if all poses and objects were known, shape (p,).")
+      .def_readonly("from_odometry",
+                    &CalibrationScore::from_odometry,
+                    "Covariance of the scores by the noise of odometry, shape (p, p).")
+      .def_readonly("from_boxes",
+                    &CalibrationScore::from_boxes,
+                    "Covariance of the scores by the noise of boxes, shape (p, p).");
+  m.def("calibration_parameters", &CalibrationParameters, "The parameters of score tests.");
+  m.def("score_calibration",
+        &ScoreCalibration,
+        "graph"_a,
+        "options"_a,
+        "state"_a,
+        "timestamps"_a,
+        py::call_guard<py::gil_scoped_release>(),
+        "Score tests of camera, mount and odometry at an estimate.");
+  m.def("recalibrate",
+        &Recalibrate,
+        "graph"_a,
+        "state"_a,
+        "timestamps"_a,
+        "deviations"_a,
+        py::call_guard<py::gil_scoped_release>(),
+        "The graph with deviations of its parameters, shape (p,).");
 }
 
 }  // namespace dqslam

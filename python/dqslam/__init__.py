@@ -43,6 +43,10 @@ if TYPE_CHECKING:  # the one list of public names, a line each: lazy_exports rea
     from dqslam.assumptions import SizePrior as SizePrior
     from dqslam.assumptions import SizePriors as SizePriors
     from dqslam.assumptions import load_size_priors as load_size_priors
+    from dqslam.calibration import CalibrationFinding as CalibrationFinding
+    from dqslam.calibration import calibration_parameters as calibration_parameters
+    from dqslam.calibration import check_calibration as check_calibration
+    from dqslam.calibration import solve_with_calibration as solve_with_calibration
     from dqslam.estimate import Estimate as Estimate
     from dqslam.evaluation import evaluate_results as evaluate_results
     from dqslam.graph import Graph as Graph

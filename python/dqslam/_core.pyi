@@ -14,6 +14,8 @@ import numpy.typing
 __all__: list[str] = [
     "Backend",
     "BoxTable",
+    "CalibrationParameter",
+    "CalibrationScore",
     "Camera",
     "Covariance",
     "Fit",
@@ -46,6 +48,7 @@ __all__: list[str] = [
     "axes_from_ellipsoid",
     "between",
     "box_chi_squares",
+    "calibration_parameters",
     "compose",
     "covariance",
     "dead_reckon",
@@ -65,7 +68,9 @@ __all__: list[str] = [
     "plus",
     "project_to_boxes",
     "project_to_outlines",
+    "recalibrate",
     "relocalize",
+    "score_calibration",
     "shape_from_axes_jacobian",
     "solve",
     "world_from_camera",
@@ -811,6 +816,51 @@ class Fit:
         Residuals in sigmas, shape (n, k), one row for each step.
         """
 
+class CalibrationParameter:
+    """
+    A deviation from what a graph takes for known.
+    """
+    @property
+    def name(self) -> str:
+        """
+        What it is.
+        """
+    @property
+    def unit(self) -> str:
+        """
+        Its unit, empty for a share.
+        """
+
+class CalibrationScore:
+    """
+    Score tests of the calibration.
+    """
+    @property
+    def from_boxes(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Covariance of the scores by the noise of boxes, shape (p, p).
+        """
+    @property
+    def from_odometry(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Covariance of the scores by the noise of odometry, shape (p, p).
+        """
+    @property
+    def information(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Information, shape (p, p).
+        """
+    @property
+    def score(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        Scores, shape (p,).
+        """
+    @property
+    def unchecked(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        Information if all poses and objects were known, shape (p,).
+        """
+
 class Relocation:
     """
     Where the robot is in a map, and where else it may be.
@@ -1196,6 +1246,11 @@ def box_chi_squares(
     Chi-squares (n,), 4 degrees of freedom, of boxes (n, 4) with covariances (n, 16) [px^2] and edges that the image border cut (n, 4), for ellipsoid i from pose i. An edge that only bounds the object counts where the prediction ends inside. Infinite unless the object is strictly in front.
     """
 
+def calibration_parameters() -> list[CalibrationParameter]:
+    """
+    The parameters of score tests.
+    """
+
 def compose(
     model: PoseModel,
     a_from_b: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
@@ -1360,6 +1415,16 @@ def project_to_outlines(
     Outlines (n, points, 2) of ellipsoid i from pose i [undistorted px], the last point the first again; NaN where it is not strictly in front.
     """
 
+def recalibrate(
+    graph: Graph,
+    state: State,
+    timestamps: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    deviations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+) -> Graph:
+    """
+    The graph with deviations of its parameters, shape (p,).
+    """
+
 def relocalize(
     pose_model: PoseModel,
     camera: Camera,
@@ -1375,6 +1440,16 @@ def relocalize(
 ) -> Relocation:
     """
     Find the pose from boxes (b, 4) of objects (o, 9), with covariances (o, 81) and (b, 16); the candidates of a box are rows of objects that it may show. ValueError where there is none.
+    """
+
+def score_calibration(
+    graph: Graph,
+    options: SolveOptions,
+    state: State,
+    timestamps: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+) -> CalibrationScore:
+    """
+    Score tests of camera, mount and odometry at an estimate.
     """
 
 def shape_from_axes_jacobian(

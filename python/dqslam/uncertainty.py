@@ -16,6 +16,7 @@ from dqslam.estimate import Estimate
 from dqslam.graph import Graph
 from dqslam.metrics import true_rows
 from dqslam.recording import Truth
+from dqslam.subgraph import only_objects, rebuilt
 
 
 @dataclass(frozen=True)
@@ -85,7 +86,7 @@ def marginal_covariances(
     is_quadric = options.landmark_model == LandmarkModel.DUAL_QUADRIC
     landmarks = estimate.dual_quadrics if is_quadric else estimate.ellipsoids
     mapped = np.isin(graph.object_ids, estimate.object_ids)
-    core = graph.core if mapped.all() else _only_objects(graph.core, mapped)
+    core = graph.core if mapped.all() else only_objects(graph.core, mapped)
     return _marginals(core, estimate.object_ids, options, _core.State(estimate.poses, landmarks))
 
 
@@ -112,7 +113,7 @@ def true_state(graph: Graph, truth: Truth, options: SolveOptions) -> _core.State
     """
     if truth.ellipsoids is not None:
         return _core.State(truth.poses, truth.ellipsoids[true_rows(graph.object_ids, truth)])
-    at_truth = _rebuilt(graph.core, initial_poses=truth.poses)
+    at_truth = rebuilt(graph.core, initial_poses=truth.poses)
     mapping = SolveOptions(mode=Mode.MAPPING, loss=options.loss)
     return _core.State(truth.poses, _core.solve(at_truth, mapping).landmarks)
 
@@ -162,42 +163,3 @@ def _named(found: _core.UnderConstrained, object_ids: Ints) -> UnderConstrained:
     if found.kind == _core.VariableKind.POSE:
         return UnderConstrained("pose", found.row, found.parameter)
     return UnderConstrained("object", int(object_ids[found.row]), found.parameter)
-
-
-def _rebuilt(core: _core.Graph, **changes: Any) -> _core.Graph:
-    """Return a problem with some of its tables replaced."""
-    names = ("initial_poses", "odometry", "boxes", "size_prior", "measurements", "scene_priors")
-    tables = {name: getattr(core, name) for name in names} | changes
-    return _core.Graph(core.pose_model, core.camera, **tables)
-
-
-def _only_objects(core: _core.Graph, kept: Bools) -> _core.Graph:
-    """Return a problem with the objects `kept` (o,) only, and with their measurements only."""
-    row = np.cumsum(kept) - 1
-    boxes, prior = core.boxes, core.size_prior
-    box = kept[boxes.object]
-    return _rebuilt(
-        core,
-        boxes=_core.BoxTable(
-            pose=boxes.pose[box],
-            object=row[boxes.object[box]],
-            box=boxes.box[box],
-            covariance=boxes.covariance[box],
-            truncated=boxes.truncated[box],
-        ),
-        size_prior=_core.SizePriorTable(
-            log_mean=prior.log_mean[kept], log_sigma=prior.log_sigma[kept]
-        ),
-        measurements=[_only_kept(table, kept, row) for table in core.measurements],
-    )
-
-
-def _only_kept(table: _core.MeasurementTable, kept: Bools, row: Ints) -> _core.MeasurementTable:
-    part = kept[table.object]
-    return _core.MeasurementTable(
-        kind=table.kind,
-        pose=table.pose[part],
-        object=row[table.object[part]],
-        value=table.value[part],
-        covariance=table.covariance[part],
-    )

@@ -139,6 +139,13 @@ int Information::ObjectColumn(int object) const {
   return std::accumulate(begin, begin + num_free_poses, 0) + object * kLandmarkSize;
 }
 
+StageTerms InformationTerms(const Graph& graph, const SolveOptions& options, const State& state) {
+  const PreparedGraph prepared(graph, options.mode == Mode::kMapping);
+  const Monitor no_monitor;
+  const SolveContext context{prepared, options, no_monitor};
+  return SelectTerms(context, StageOfInliers(context, state), state);
+}
+
 Information ComputeInformation(const Graph& graph,
                                const SolveOptions& options,
                                const State& state) {

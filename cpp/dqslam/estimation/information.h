@@ -4,7 +4,7 @@
 #include <Eigen/SparseCore>
 #include <vector>
 
-#include "dqslam/solver/stage.h"
+#include "dqslam/solver/stage_terms.h"
 
 namespace dqslam {
 
@@ -28,6 +28,9 @@ struct Information {
 /// std::invalid_argument for a state that does not fit the graph, and std::runtime_error where a
 /// residual of the last stage is undefined at the state.
 Information ComputeInformation(const Graph& graph, const SolveOptions& options, const State& state);
+
+/// The terms behind the rows, in their order.
+StageTerms InformationTerms(const Graph& graph, const SolveOptions& options, const State& state);
 
 /// H with 1e-12 of its diagonal added, so that it can be factorized even where a direction is
 /// undetermined.
