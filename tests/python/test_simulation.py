@@ -8,7 +8,8 @@ import oracle
 from dqslam import _core, load_scenario, simulate
 from dqslam._core import PoseModel
 from dqslam.metrics import position_error
-from dqslam.simulation.simulator import _cube_boxes, _World
+from dqslam.simulation.projection import Polyhedra, Views
+from dqslam.simulation.world import World
 
 PAPER = load_scenario("paper")
 HONEST = load_scenario("honest")
@@ -154,14 +155,15 @@ def test_detections_are_the_boxes_that_brute_force_finds():
 
 def test_a_cubes_box_bounds_its_corners():
     recording, truth = paper()
-    world = _World(
+    world = World(
         center=np.array([[2.0, 6.0, 0.2], [-3.0, 5.0, -0.4], [0.0, -6.0, 0.0]]),
         side=np.array([0.5, 1.1, 0.4]),
         yaw=np.array([0.3, -2.0, 0.0]),
         semi_axes=np.ones((3, 3)),
         orientation=np.tile([0.0, 0.0, 0.0, 1.0], (3, 1)),
     )
-    boxes, in_front = _cube_boxes(recording.camera, truth, world)
+    views = Views(recording.camera, truth.pose_model, truth.poses)
+    boxes, in_front = Polyhedra(world.cube_corners()).boxes(views)
     for pose in range(40):
         for row in range(3):
             corners = oracle.cube_corners(world.center[row], world.side[row], world.yaw[row])

@@ -75,7 +75,7 @@ def test_objects_can_be_chosen(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ('objects = "cubes"', 'objects = "spheres"', r"objects: Input should be 'cubes' or 'ell"),
+        ('objects = "cubes"', 'objects = "spheres"', r"objects: Input should be 'cubes', 'ell"),
         ("laps = 2", "laps = 0", r"path\.laps: .* greater than or equal to 1"),
         ("laps = 2", "laps = 2.5", r"path\.laps: .* integer"),
         ("laps = 2", "", r":7: path\.laps is missing$"),

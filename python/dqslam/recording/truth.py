@@ -28,7 +28,7 @@ class Truth:
     ellipsoids: Floats | None = None
     """Center and log-Cholesky shape, shape (o, 9); None when the objects are no ellipsoids."""
     box_object_id: Ints | None = None
-    """Which object each box of the recording shows, whatever its id says; shape (m,)."""
+    """Which object each box of the recording shows, whatever its id says, -1 for none; (m,)."""
 
     def __post_init__(self) -> None:
         """Check shapes and numbers."""
@@ -46,7 +46,7 @@ class Truth:
         box_object_id = self.box_object_id
         if box_object_id is not None:
             box_object_id = as_ints("truth.box_object_id", box_object_id)
-            unknown = ~np.isin(box_object_id, object_id)
+            unknown = ~np.isin(box_object_id, [-1, *object_id])
             reject_rows("truth.box_object_id", unknown, "no such object", box_object_id)
         assign(
             self,
