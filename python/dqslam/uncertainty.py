@@ -106,15 +106,20 @@ def posterior_bound(graph: Graph, truth: Truth) -> Bound:
 
 
 def true_state(graph: Graph, truth: Truth, options: SolveOptions) -> _core.State:
-    """Return the true poses and objects of a problem, mapped if they are not ellipsoids.
+    """Return the true poses and objects of a problem.
 
-    The objects have the parameters of the ellipsoid model.
+    Objects that are not ellipsoids, or that do not exist, are mapped at the true poses. All have
+    the parameters of the ellipsoid model.
     """
-    if truth.ellipsoids is not None:
+    exists = np.isin(graph.object_ids, truth.object_id)
+    if truth.ellipsoids is not None and exists.all():
         return _core.State(truth.poses, truth.ellipsoids[true_rows(graph.object_ids, truth)])
     at_truth = _rebuilt(graph.core, initial_poses=truth.poses)
     mapping = SolveOptions(mode=Mode.MAPPING, loss=options.loss)
-    return _core.State(truth.poses, _core.solve(at_truth, mapping).landmarks)
+    objects = np.array(_core.solve(at_truth, mapping).landmarks)
+    if truth.ellipsoids is not None:
+        objects[exists] = truth.ellipsoids[true_rows(graph.object_ids[exists], truth)]
+    return _core.State(truth.poses, objects)
 
 
 def expected_distance(covariances: Floats) -> Floats:

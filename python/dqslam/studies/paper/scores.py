@@ -41,6 +41,8 @@ class BoundScore:
     """Mean of the same quantity over the centers of the mapped objects (3 degrees of freedom)."""
     is_optimum: bool
     """Whether a start at the truth does not reach a lower cost."""
+    excess_cost: float = float("nan")
+    """Final cost less that of the same solve that starts at the truth."""
 
 
 @dataclass(frozen=True)
@@ -74,8 +76,10 @@ def score_bound(
     covariance = marginal_covariances(graph, estimate, options)
     pose_error = _core.minus(truth.pose_model, truth.poses, estimate.poses)[1:]
     pose_nees = normalized_squares(pose_error, covariance.poses[1:])
-    rows = true_rows(estimate.object_ids, truth)
-    center_nees = normalized_squares(truth.center[rows] - estimate.centers, covariance.centers)
+    exists = np.isin(estimate.object_ids, truth.object_id)
+    rows = true_rows(estimate.object_ids[exists], truth)
+    center_error = truth.center[rows] - estimate.centers[exists]
+    center_nees = normalized_squares(center_error, covariance.centers[exists])
     _, from_truth = solve(graph, options, start=true_state(graph, truth, options))
     return BoundScore(
         bound=posterior_bound(right_graph, truth).position_error,
@@ -84,6 +88,7 @@ def score_bound(
         pose_dof=pose_error.shape[1],
         center_nees=float(np.nanmean(center_nees)),  # NaN for an object that is undetermined
         is_optimum=bool(summary.final_cost <= from_truth.final_cost + SAME_COST),
+        excess_cost=summary.final_cost - from_truth.final_cost,
     )
 
 

@@ -1,0 +1,129 @@
+"""``dqslam worlds``: how the estimator does in worlds unlike the paper's."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from dqslam._files import results_directory, uninterrupted
+from dqslam.cli.options import BackendName, FirstSeed, Jobs, ResultDirectory, Scheduler
+from dqslam.cli.output import Json, Output, Quiet
+from dqslam.cli.settings import CONFIG, ConfigFile, save_settings
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from dqslam.studies.worlds import RowName, WorldsSummary
+
+
+def worlds(
+    context: typer.Context,
+    out: ResultDirectory,
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[NAME|FILE]...", help="Worlds, or TOML files like theirs. Default: all."
+        ),
+    ] = None,
+    trials: Annotated[int, typer.Option(min=1, help="Seeds of each world.")] = 20,
+    seed: FirstSeed = 0,
+    row: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="ROW",
+            help="told, default, robust or run; can be repeated. Default: told where there are "
+            "right sigmas, default, and robust where boxes show something else.",
+        ),
+    ] = None,
+    page: Annotated[
+        Path | None,
+        typer.Option(help="Markdown page whose table of the worlds is to be replaced."),
+    ] = None,
+    jobs: Jobs = None,
+    backend: BackendName = None,
+    scheduler: Scheduler = None,
+    config: ConfigFile = None,
+    quiet: Quiet = False,
+    json: Json = False,
+) -> None:
+    """Solve worlds of many kinds and print how many solves reach the optimum, and their errors.
+
+    Writes worlds.json, worlds.md (the table), trials.csv with a row for each solve, and
+    config.toml.
+    """
+    from dqslam.simulation.scenario import load_scenario
+    from dqslam.studies.worlds import all_worlds, replace_table, run_worlds, save_results
+
+    scenarios = [load_scenario(name) for name in names or all_worlds()]
+    rows = _rows(row)
+    output = Output(quiet=quiet, as_json=json)
+    with results_directory(out), output.trials(len(scenarios) * trials) as progress:
+        summary = run_worlds(
+            scenarios,
+            trials=trials,
+            seed=seed,
+            rows=rows,
+            jobs=jobs,
+            backend=backend,
+            scheduler=scheduler,
+            progress=progress,
+        )
+    output.table(_table(summary))
+    for line in _failures(summary):
+        output.line(line)
+    with uninterrupted():
+        *tables, result = save_results(summary, out)
+        save_settings(context, out / CONFIG)
+        for path in tables:
+            output.line(f"wrote {path}")
+        output.file(result)
+        if page is not None:
+            replace_table(page, summary)
+            output.line(f"wrote {page}")
+
+
+def _rows(given: list[str] | None) -> "tuple[RowName, ...] | None":
+    from dqslam.studies.worlds import ROWS
+
+    if not given:
+        return None
+    unknown = [name for name in given if name not in ROWS]
+    if unknown:
+        raise ValueError(f"--row: {unknown[0]!r} is none of {', '.join(ROWS)}")
+    return tuple(name for name in ROWS if name in given)
+
+
+def _table(summary: "WorldsSummary") -> "Table":
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    from dqslam.studies.worlds import NUMBERS, cells
+
+    seeds = summary.seeds
+    shown = Table(
+        title=f"seeds {seeds[0]} to {seeds[-1]}; "
+        "positions: mean / median / max, NEES: mean / median",
+        box=SIMPLE_HEAD,
+        padding=(0, 1, 0, 0),
+    )
+    shown.add_column("world", no_wrap=True)
+    shown.add_column("", no_wrap=True)
+    for heading in NUMBERS:
+        shown.add_column(heading.replace(" ", "\n", 1), justify="right", no_wrap=True)
+    for world in summary.worlds:
+        for number, (name, row) in enumerate(world.rows.items()):
+            shown.add_row("" if number else world.scenario.name, name, *cells(world, row))
+    return shown
+
+
+def _failures(summary: "WorldsSummary") -> list[str]:
+    """Say why trials failed: of each row the first reason, and how many there are."""
+    lines = []
+    for world in summary.worlds:
+        for name, row in world.rows.items():
+            for what, failures in (("failed", row.failures), ("unscored", row.score_failures)):
+                if failures:
+                    seed, why = next(iter(failures.items()))
+                    more = f" (and {len(failures) - 1} more)" if len(failures) > 1 else ""
+                    lines.append(f"{what}: {world.scenario.name}, {name}, seed {seed}: {why}{more}")
+    return lines
