@@ -52,10 +52,18 @@ def worlds(
     config.toml.
     """
     from dqslam.simulation.scenario import load_scenario
-    from dqslam.studies.worlds import all_worlds, replace_table, run_worlds, save_results
+    from dqslam.studies.worlds import (
+        all_worlds,
+        around_table,
+        replace_table,
+        run_worlds,
+        save_results,
+    )
 
     scenarios = [load_scenario(name) for name in names or all_worlds()]
     rows = _rows(row)
+    if page is not None:  # before the work: does it have a place for the table?
+        around_table(page)
     output = Output(quiet=quiet, as_json=json)
     with results_directory(out), output.trials(len(scenarios) * trials) as progress:
         summary = run_worlds(

@@ -10,3 +10,4 @@ from dqslam.simulation.detector.ids import associate as associate
 from dqslam.simulation.detector.ids import switch_in_bursts as switch_in_bursts
 from dqslam.simulation.detector.occlusion import Outline as Outline
 from dqslam.simulation.detector.occlusion import hide as hide
+from dqslam.simulation.detector.occlusion import seen_box as seen_box

@@ -60,11 +60,13 @@ def _is_other_kind(base: dict[str, Any], changes: dict[str, Any]) -> bool:
     return "kind" in changes and changes["kind"] != base.get("kind")
 
 
-def _folders() -> list[Path]:
-    """Return the folders of named scenarios, in the installed package or in a checkout."""
+def _folders(part: str) -> list[Path]:
+    """Return folders of named scenarios, in the installed package or in a checkout."""
     here = Path(__file__).resolve()
-    roots = [root / "data" / "scenarios" for root in (here.parents[2], here.parents[4])]
-    return [folder for root in roots for folder in (root, root / "worlds")]
+    return [root / "data" / "scenarios" / part for root in (here.parents[2], here.parents[4])]
+
+
+_WHOLE, _WORLDS = _folders(""), _folders("worlds")
 
 
 def _find(source: str | Path) -> Path:
@@ -72,8 +74,13 @@ def _find(source: str | Path) -> Path:
     if path.is_file():
         return path
     if path.name == str(source) and not path.suffix:
-        for folder in _folders():
+        for folder in (*_WHOLE, *_WORLDS):
             if (folder / f"{source}.toml").is_file():
                 return folder / f"{source}.toml"
-    known = sorted({file.stem for folder in _folders() for file in folder.glob("*.toml")})
-    raise FileNotFoundError(f"{source}: no such scenario; by name there are: {', '.join(known)}")
+    names = [
+        ", ".join(sorted({file.stem for folder in folders for file in folder.glob("*.toml")}))
+        for folders in (_WHOLE, _WORLDS)
+    ]
+    raise FileNotFoundError(
+        f"{source}: no such scenario; by name there are: {names[0]}; and worlds: {names[1]}"
+    )

@@ -24,7 +24,7 @@ class RoundedRectangleSettings(Settings):
 
 
 class FigureOfEightSettings(Settings):
-    """Two equal circles on the plane z = 0 that touch at the origin, where the robot starts.
+    """Two equal circles on the plane z = 0 that share a step, from the origin along the x axis.
 
     The left one is driven first, counter-clockwise, then the right one, clockwise.
     """

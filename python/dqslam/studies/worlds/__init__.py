@@ -4,7 +4,7 @@ from dqslam.studies.worlds.battery import WORLDS as WORLDS
 from dqslam.studies.worlds.battery import all_worlds as all_worlds
 from dqslam.studies.worlds.rows import ROWS as ROWS
 from dqslam.studies.worlds.rows import RowName as RowName
-from dqslam.studies.worlds.rows import has_true_beliefs as has_true_beliefs
+from dqslam.studies.worlds.rows import possible_rows as possible_rows
 from dqslam.studies.worlds.rows import usual_rows as usual_rows
 from dqslam.studies.worlds.run import run_worlds as run_worlds
 from dqslam.studies.worlds.summary import RowSummary as RowSummary
@@ -12,6 +12,7 @@ from dqslam.studies.worlds.summary import WorldsSummary as WorldsSummary
 from dqslam.studies.worlds.summary import WorldSummary as WorldSummary
 from dqslam.studies.worlds.summary import summarize as summarize
 from dqslam.studies.worlds.table import NUMBERS as NUMBERS
+from dqslam.studies.worlds.table import around_table as around_table
 from dqslam.studies.worlds.table import cells as cells
 from dqslam.studies.worlds.table import markdown as markdown
 from dqslam.studies.worlds.table import replace_table as replace_table

@@ -6,7 +6,7 @@ from functools import partial
 
 from dqslam.simulation.scenario import Scenario
 from dqslam.studies.pool import Backend, run_each
-from dqslam.studies.worlds.rows import RowName, usual_rows
+from dqslam.studies.worlds.rows import RowName, possible_rows, usual_rows
 from dqslam.studies.worlds.summary import WorldsSummary, summarize
 from dqslam.studies.worlds.trial import WorldTrial, run_trial
 
@@ -31,7 +31,7 @@ def run_worlds(
     scenarios
         The worlds; their names must differ.
     rows
-        What is run in each; by default what makes sense in it, without the pipeline.
+        What is run in each world where it is possible; by default `usual_rows`.
     jobs, backend, scheduler
         Where trials run, as in `pool.run_each`. Only times depend on it.
     progress
@@ -43,9 +43,10 @@ def run_worlds(
     by_name = {scenario.name: scenario for scenario in scenarios}
     if not scenarios or len(by_name) < len(scenarios):
         raise ValueError("scenarios: expected one or more, of different names")
+    chosen = {name: _rows(scenario, rows) for name, scenario in by_name.items()}
     seeds = range(seed, seed + trials)
     items = [(scenario.name, one) for scenario in scenarios for one in seeds]
-    run = partial(_run_item, scenarios=by_name, rows=rows)
+    run = partial(_run_item, scenarios=by_name, rows=chosen)
     done: list[WorldTrial] = []
     with closing(run_each(run, items, jobs=jobs, backend=backend, scheduler=scheduler)) as running:
         for trial in running:
@@ -55,8 +56,19 @@ def run_worlds(
     return summarize(scenarios, seeds, done)
 
 
+def _rows(scenario: Scenario, asked: tuple[RowName, ...] | None) -> tuple[RowName, ...]:
+    if asked is None:
+        return usual_rows(scenario)
+    rows = tuple(row for row in possible_rows(scenario) if row in asked)
+    if not rows:
+        raise ValueError(f"rows: {scenario.name} has no right sigmas that could be told")
+    return rows
+
+
 def _run_item(
-    item: tuple[str, int], scenarios: dict[str, Scenario], rows: tuple[RowName, ...] | None
+    item: tuple[str, int],
+    scenarios: dict[str, Scenario],
+    rows: dict[str, tuple[RowName, ...]],
 ) -> WorldTrial:
-    scenario = scenarios[item[0]]
-    return run_trial(scenario, item[1], usual_rows(scenario) if rows is None else rows)
+    name, seed = item
+    return run_trial(scenarios[name], seed, rows[name])

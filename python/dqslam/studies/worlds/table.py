@@ -68,20 +68,25 @@ def markdown(summary: WorldsSummary) -> str:
     return "\n".join(lines) + "\n"
 
 
-def replace_table(page: Path, summary: WorldsSummary) -> None:
-    """Put the table between the two marks of a page.
+def around_table(page: Path) -> tuple[str, str]:
+    """Return what stands before and after the table of a page, both with their mark.
 
     Raises
     ------
     FileError
         If the page does not have both marks.
     """
-    text = read_text(page)
-    before, begin, rest = text.partition(BEGIN)
+    before, begin, rest = read_text(page).partition(BEGIN)
     _, end, after = rest.partition(END)
     if not end:
         raise FileError(page, f"has no place for a table: {BEGIN} and {END}")
-    write_text(page, f"{before}{begin}\n\n{markdown(summary)}\n{end}{after}")
+    return before + begin, end + after
+
+
+def replace_table(page: Path, summary: WorldsSummary) -> None:
+    """Put the table between the two marks of a page; see `around_table` for errors."""
+    before, after = around_table(page)
+    write_text(page, f"{before}\n\n{markdown(summary)}\n{after}")
 
 
 def _parts(summary: WorldsSummary) -> Iterator[tuple[str, list[WorldSummary]]]:
