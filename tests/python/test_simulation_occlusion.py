@@ -119,7 +119,7 @@ def test_boxes_of_a_crowd_are_those_of_sampled_surfaces(objects):
     assert not hidden.detections.truncated.any()
     assert len(exact.keys() - part.keys()) > 0
     if objects == "ellipsoids":
-        for pair in shrunk[::10]:
+        for pair in sorted(shrunk)[::10]:
             np.testing.assert_allclose(part[pair], sampled_box(hidden, truth, pair), atol=3.0)
 
 
@@ -133,7 +133,7 @@ def sampled_box(recording, truth, pair):
     pose, shown = pair
     robot = oracle.se2_matrix(truth.poses[pose])
     bodies = [_core.axes_from_ellipsoid(one) for one in truth.ellipsoids]
-    surfaces = [oracle.ellipsoid_surface(*body, count=250) for body in bodies]
+    surfaces = [oracle.ellipsoid_surface(*body, count=120) for body in bodies]
     pixels, _ = oracle.to_pixels(recording.camera, robot, surfaces[shown])
     eye = (robot @ oracle.se3_matrix(recording.camera.robot_from_camera))[:3, 3]
     distance = np.linalg.norm(truth.center - eye, axis=1)

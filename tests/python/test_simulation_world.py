@@ -79,6 +79,8 @@ def test_the_box_of_a_cuboid_bounds_its_corners():
     for row, ellipsoid in enumerate(twins.ellipsoids):
         center, half, turn = _core.axes_from_ellipsoid(ellipsoid)
         assert truth.volume[row] == pytest.approx(8.0 * half.prod())
+        np.testing.assert_allclose(np.sort(truth.cuboids[row, 3:6]), np.sort(half), rtol=1e-6)
+        np.testing.assert_array_equal(truth.cuboids[row, :3], truth.center[row])
         signs = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)])
         corners = center + (signs * half) @ oracle.quaternion_matrix(turn).T
         for index in np.flatnonzero(truth.box_object_id == row)[::17]:

@@ -22,7 +22,7 @@ def simulate(
         typer.Argument(
             metavar="[NAME|FILE]",
             help="paper: a drive on the plane; orbit: hand-held, in space; honest, honest_orbit; "
-            "or a TOML file like theirs.",
+            "a world of `dqslam worlds`; or a TOML file like theirs.",
         ),
     ] = "paper",
     seed: Annotated[int, typer.Option(min=0, help="Seed of the world and of all noise.")] = 0,

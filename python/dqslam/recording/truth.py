@@ -27,6 +27,9 @@ class Truth:
     """One per object."""
     ellipsoids: Floats | None = None
     """Center and log-Cholesky shape, shape (o, 9); None when the objects are no ellipsoids."""
+    cuboids: Floats | None = None
+    """Center, half the sides and world_from_object, a quaternion, of cuboids with three different
+    sides, shape (o, 10)."""
     box_object_id: Ints | None = None
     """Which object each box of the recording shows, whatever its id says, -1 for none; (m,)."""
 
@@ -43,6 +46,9 @@ class Truth:
         ellipsoids = self.ellipsoids
         if ellipsoids is not None:
             ellipsoids = as_floats("truth.ellipsoids", ellipsoids, [count, 9])
+        cuboids = self.cuboids
+        if cuboids is not None:
+            cuboids = as_floats("truth.cuboids", cuboids, [count, 10])
         box_object_id = self.box_object_id
         if box_object_id is not None:
             box_object_id = as_ints("truth.box_object_id", box_object_id)
@@ -56,6 +62,7 @@ class Truth:
             volume=volume,
             class_name=tuple(self.class_name),
             ellipsoids=ellipsoids,
+            cuboids=cuboids,
             box_object_id=box_object_id,
         )
 

@@ -9,7 +9,7 @@ from dqslam._core import PoseModel
 from dqslam.simulation.path import TruePath
 from dqslam.simulation.scenario import AlongPathSettings, InsidePathSettings, OnTableSettings
 
-_TRIES = 1000  # to find a place that is far enough from the path
+_TRIES = 200  # to find places that are far enough from the path
 
 
 def inside_path(world: InsidePathSettings, poses: Floats, random: Generator) -> Floats:

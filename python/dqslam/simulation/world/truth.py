@@ -10,13 +10,14 @@ from dqslam.simulation.world.draw import World
 
 
 def true_answer(scenario: Scenario, motion: TruePath, world: World) -> Truth:
-    """Return poses, objects and their volumes; only ellipsoids have parameters."""
+    """Return poses, objects and their volumes; cubes have no further parameters."""
     count = len(world.center)
-    ellipsoids = None
+    ellipsoids = cuboids = None
     if scenario.objects == "cubes":
         volume = world.side**3
     elif scenario.objects == "cuboids":
         volume = 8.0 * world.semi_axes.prod(axis=1)
+        cuboids = np.hstack([world.center, world.semi_axes, world.orientation])
     else:
         rows = zip(world.center, world.semi_axes, world.orientation, strict=True)
         ellipsoids = np.array([_core.ellipsoid_from_axes(*row) for row in rows])
@@ -31,6 +32,7 @@ def true_answer(scenario: Scenario, motion: TruePath, world: World) -> Truth:
             scenario.objects.removesuffix("s"), scenario.world.class_count, count
         ),
         ellipsoids=ellipsoids,
+        cuboids=cuboids,
     )
 
 

@@ -47,8 +47,8 @@ class Settings:
 
 
 def default_loss(scenario: Scenario, method: Method) -> LossName:
-    """Return a robust loss if ids are wrong, and none for right ids or the paper's method."""
-    is_robust = scenario.detector.wrong_associations > 0.0 and method == "dqslam"
+    """Return a robust loss if some boxes show something else, and none for the paper's method."""
+    is_robust = scenario.detector.shows_wrong_objects and method == "dqslam"
     return ROBUST_LOSS if is_robust else "none"
 
 
