@@ -93,6 +93,30 @@ def test_same_seed_same_bits():
     assert np.abs(once.odometry.relative - other.odometry.relative).max() > 0.01
 
 
+def test_new_kinds_of_errors_leave_the_numbers_of_older_scenarios():
+    recording, truth = paper()
+    numbers = [
+        (recording.odometry.relative[7], [0.5354994614218, 0.0, 0.0317944752467]),
+        (
+            recording.detections.box[11],
+            [141.539971148, 121.634565112, 518.677306327, 449.070723153],
+        ),
+        (recording.positions.object_in_robot[11], [-0.454569581182, 2.22307133431, 0.37730025948]),
+        (truth.center[4], [-3.935317607090, 7.962135029120, -0.355766897287]),
+        (truth.volume[4], 0.358689704542),
+    ]
+    orbit, orbited = simulate(load_scenario("orbit"), seed=3)
+    numbers += [
+        (orbit.odometry.relative[7][:3], [0.00294181204011, -0.0914550853574, -0.0252925192357]),
+        (orbit.detections.box[11], [462.575802901, 229.522193481, 518.427265768, 280.557029125]),
+        (orbited.poses[9][:3], [1.033848838304, 0.661617642278, 0.482700204733]),
+        (orbited.center[4], [0.282518303985, 0.361590198844, 0.0873762192222]),
+    ]
+    for drawn, before in numbers:
+        np.testing.assert_allclose(drawn, before, rtol=1e-9)
+    assert (len(recording.detections), len(orbit.detections)) == (409, 1125)
+
+
 def test_the_kind_of_objects_changes_nothing_but_the_boxes():
     (cubes, true_cubes), (ellipsoids, true_ellipsoids) = paper("cubes"), paper("ellipsoids")
     np.testing.assert_array_equal(cubes.odometry.relative, ellipsoids.odometry.relative)

@@ -10,7 +10,7 @@ from dqslam._core import Camera
 from dqslam.recording import Detections
 from dqslam.simulation.detector.border import cut_at_border, is_detected
 from dqslam.simulation.detector.edges import disturb_edges
-from dqslam.simulation.detector.false_boxes import draw_false_boxes
+from dqslam.simulation.detector.false_boxes import FalseBoxes, draw_false_boxes
 from dqslam.simulation.detector.ids import associate, switch_in_bursts
 from dqslam.simulation.scenario import DetectorSettings
 
@@ -69,25 +69,40 @@ def detect(
     said = associate(pose, object_row, center, settings, streams.ids)
     said = switch_in_bursts(said, object_row, settings, streams.bursts)
     false = draw_false_boxes(pose, said, measured, len(box), camera, settings, streams.false_boxes)
-    names = tuple(dict.fromkeys(class_name))
+    drawn = _Drawn(pose, measured, said, object_row, truncated)
+    return _joined(drawn, false, class_name)
+
+
+class _Drawn(NamedTuple):
+    """The boxes that show objects, one row each."""
+
+    pose: Ints  # (m,)
+    box: Floats  # (m, 4)
+    said: Ints  # row of the object of the id, (m,)
+    shown: Ints  # row of the object, (m,)
+    truncated: Bools  # (m, 4)
+
+
+def _joined(drawn: _Drawn, false: FalseBoxes, class_name: tuple[str, ...]) -> Boxes:
+    """Put both kinds of boxes in the order of the poses.
+
+    A false box has the class of the object that it pretends to be; if it is none, they take turns.
+    """
+    objects, names = len(class_name), tuple(dict.fromkeys(class_name))
     class_of_row = np.array([names.index(name) for name in class_name])
-    order = np.argsort(np.concatenate([pose, false.pose]), kind="stable")
-    own = len(class_name) - 1 - false.said  # after the ids of the objects
-    object_id = np.concatenate([said, np.where(false.said < 0, own, false.said)])
-    shown = np.concatenate([object_row, np.full(len(false.pose), -1)])
-    of_class = np.concatenate([class_of_row[object_row], _classes_of(false.said, class_of_row)])
+    own = -1 - false.said  # number of an id of its own
+    pretended = np.where(false.said < 0, own % objects, false.said)
+    order = np.argsort(np.concatenate([drawn.pose, false.pose]), kind="stable")
+    uncut = np.zeros(false.box.shape, dtype=np.bool_)
     detections = Detections(
-        pose=np.concatenate([pose, false.pose])[order],
-        box=np.vstack([measured, false.box])[order],
+        pose=np.concatenate([drawn.pose, false.pose])[order],
+        box=np.vstack([drawn.box, false.box])[order],
         score=np.ones(len(order)),
-        class_id=of_class[order],
-        object_id=object_id[order],
+        class_id=class_of_row[np.concatenate([drawn.shown, pretended])[order]],
+        object_id=np.concatenate([drawn.said, np.where(false.said < 0, objects + own, false.said)])[
+            order
+        ],
         class_names=dict(enumerate(names)),
-        truncated=np.vstack([truncated, np.zeros(false.box.shape, dtype=np.bool_)])[order],
+        truncated=np.vstack([drawn.truncated, uncut])[order],
     )
-    return Boxes(detections, shown[order])
-
-
-def _classes_of(said: Ints, class_of_row: Ints) -> Ints:
-    """Return the class of the object that a false box pretends to be; in turn if it is none."""
-    return np.asarray(class_of_row[np.where(said < 0, (-1 - said) % len(class_of_row), said)])
+    return Boxes(detections, np.concatenate([drawn.shown, np.full(len(own), -1)])[order])
