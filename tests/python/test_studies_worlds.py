@@ -15,6 +15,7 @@ from dqslam.studies.worlds import (
     WorldTrial,
     cells,
     markdown,
+    number,
     replace_table,
     run_trial,
     run_worlds,
@@ -131,14 +132,32 @@ def test_a_line_of_the_table_by_hand():
         "optimum": "1 of 3",
         "lost": "2",
         "says converged": "2",
-        "positions, m": "81.4 / 4.1 / 240",
-        "odometry, m": "2",
+        "positions, m": "81.4 / 4.10 / 240",
+        "odometry, m": "2.00",
         "worse": "2",
-        "error / bound": "2",
-        "NEES poses": "4116 / 1",
-        "NEES centers": "3 / 3",
+        "error / bound": "2.00",
+        "NEES poses": "4116 / 1.00",
+        "NEES centers": "3.00 / 3.00",
         "failed": "",
     }
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (0.004, "0.00"),
+        (9.994, "9.99"),
+        (9.996, "10.0"),
+        (99.94, "99.9"),
+        (99.96, "100"),
+        (-12.34, "-12.3"),
+        (99999.4, "99999"),
+        (123456.0, "1e+05"),
+        (float("nan"), ""),
+    ],
+)
+def test_numbers_of_a_table(value, text):
+    assert number(value) == text
 
 
 def test_markdown_and_the_page_that_holds_it(tmp_path):

@@ -102,25 +102,39 @@ def _rows(given: list[str] | None) -> "tuple[RowName, ...] | None":
 
 
 def _table(summary: "WorldsSummary") -> "Table":
+    """Return a table that 80 columns hold; the one in worlds.md has more."""
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
-    from dqslam.studies.worlds import NUMBERS, cells
+    from dqslam.studies.worlds import number
 
     seeds = summary.seeds
     shown = Table(
-        title=f"seeds {seeds[0]} to {seeds[-1]}; "
-        "positions: mean / median / max, NEES: mean / median",
+        title=f"seeds {seeds[0]} to {seeds[-1]}; lost, in brackets those "
+        "that say converged; medians of NEES",
         box=SIMPLE_HEAD,
         padding=(0, 1, 0, 0),
     )
-    shown.add_column("world", no_wrap=True)
-    shown.add_column("", no_wrap=True)
-    for heading in NUMBERS:
-        shown.add_column(heading.replace(" ", "\n", 1), justify="right", no_wrap=True)
+    shown.add_column("world\n  row", no_wrap=True)
+    headings = ("\noptimum", "\nlost", "m\nmean", "\nmax", "\nworse")
+    for heading in (*headings, "error /\nbound", "NEES of\nposes", "NEES of\ncenters"):
+        shown.add_column(heading, justify="right", no_wrap=True)
     for world in summary.worlds:
-        for number, (name, row) in enumerate(world.rows.items()):
-            shown.add_row("" if number else world.scenario.name, name, *cells(world, row))
+        odometry = (number(world.odometry.avg), number(world.odometry.max))
+        shown.add_row(world.scenario.name, "", "", *odometry, style="bold")
+        for name, row in world.rows.items():
+            compared = row.compared > 0
+            shown.add_row(
+                f"  {name}",
+                f"{row.at_optimum} of {row.compared}" if compared else "",
+                f"{len(row.lost)} ({len(row.lost_converged)})" if compared else "",
+                number(row.positions.avg),
+                number(row.positions.max),
+                str(len(row.worse_than_odometry)),
+                number(row.error_over_bound),
+                number(row.pose_nees.med),
+                number(row.center_nees.med),
+            )
     return shown
 
 

@@ -15,6 +15,7 @@ from dqslam.studies.worlds.table import NUMBERS as NUMBERS
 from dqslam.studies.worlds.table import around_table as around_table
 from dqslam.studies.worlds.table import cells as cells
 from dqslam.studies.worlds.table import markdown as markdown
+from dqslam.studies.worlds.table import number as number
 from dqslam.studies.worlds.table import replace_table as replace_table
 from dqslam.studies.worlds.table import save_results as save_results
 from dqslam.studies.worlds.trial import LOST_COST as LOST_COST

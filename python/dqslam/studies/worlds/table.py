@@ -40,9 +40,9 @@ def cells(world: WorldSummary, row: RowSummary) -> list[str]:
         str(len(row.lost)) if compared else "",
         str(len(row.lost_converged)) if compared else "",
         _spread(row.positions),
-        _number(world.odometry.avg),
+        number(world.odometry.avg),
         str(len(row.worse_than_odometry)),
-        _number(row.error_over_bound),
+        number(row.error_over_bound),
         _mean_and_median(row.pose_nees),
         _mean_and_median(row.center_nees),
         str(failed) if failed else "",
@@ -146,23 +146,18 @@ def _cell(value: float | bool | str | None) -> float | int | str:
 
 
 def _spread(values: Statistics) -> str:
-    return " / ".join(map(_number, (values.avg, values.med, values.max)))
+    return " / ".join(map(number, (values.avg, values.med, values.max)))
 
 
 def _mean_and_median(values: Statistics) -> str:
-    return " / ".join(map(_number, (values.avg, values.med)))
+    return " / ".join(map(number, (values.avg, values.med)))
 
 
-def _number(value: float) -> str:
-    """Write a number with two or three digits that count; nothing for NaN."""
+def number(value: float) -> str:
+    """Write a number of a table; nothing for NaN."""
     if not np.isfinite(value):
         return ""
-    if abs(value) >= 1e5:
-        return f"{value:.0e}"
-    return (
-        f"{value:.0f}"
-        if abs(value) >= 99.5
-        else f"{value:.3g}"
-        if abs(value) >= 1.0
-        else f"{value:.2f}"
-    )
+    for limit, digits in ((9.995, 2), (99.95, 1), (99999.5, 0)):
+        if abs(value) < limit:
+            return f"{value:.{digits}f}"
+    return f"{value:.0e}"
