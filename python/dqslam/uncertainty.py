@@ -4,12 +4,12 @@ The first pose is fixed, and everything is relative to it.
 """
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
 from dqslam import _core
-from dqslam._checks import Bools, Floats, Ints, require
+from dqslam._checks import Floats, Ints, require
 from dqslam._core import LandmarkModel, Loss, Mode, SolveOptions
 from dqslam._repr import counted
 from dqslam.estimate import Estimate
@@ -107,15 +107,20 @@ def posterior_bound(graph: Graph, truth: Truth) -> Bound:
 
 
 def true_state(graph: Graph, truth: Truth, options: SolveOptions) -> _core.State:
-    """Return the true poses and objects of a problem, mapped if they are not ellipsoids.
+    """Return the true poses and objects of a problem.
 
-    The objects have the parameters of the ellipsoid model.
+    Objects that are not ellipsoids, or that do not exist, are mapped at the true poses. All have
+    the parameters of the ellipsoid model.
     """
-    if truth.ellipsoids is not None:
+    exists = np.isin(graph.object_ids, truth.object_id)
+    if truth.ellipsoids is not None and exists.all():
         return _core.State(truth.poses, truth.ellipsoids[true_rows(graph.object_ids, truth)])
     at_truth = rebuilt(graph.core, initial_poses=truth.poses)
     mapping = SolveOptions(mode=Mode.MAPPING, loss=options.loss)
-    return _core.State(truth.poses, _core.solve(at_truth, mapping).landmarks)
+    objects = np.array(_core.solve(at_truth, mapping).landmarks)
+    if truth.ellipsoids is not None:
+        objects[exists] = truth.ellipsoids[true_rows(graph.object_ids[exists], truth)]
+    return _core.State(truth.poses, objects)
 
 
 def expected_distance(covariances: Floats) -> Floats:

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import oracle
 from dqslam import _core, build_graph, io, load_scenario, simulate, solve
 from dqslam.recording import Detections, Odometry, Recording
 
@@ -137,3 +138,19 @@ def test_bad_covariances_are_named(tmp_path, old, new, message):
     path.write_text(text.replace(old, new, 1))
     with pytest.raises(io.FileError, match=message):
         io.read_step_covariances(path, recording.timestamps)
+
+
+def test_cuboids_have_their_sides_and_orientation(tmp_path):
+    _, truth, _, _ = written(tmp_path, "loop_cuboids", 1)
+    read = io.read_true_objects(tmp_path / "objects.csv")
+    np.testing.assert_array_equal(read.size, 2.0 * truth.cuboids[:, 3:6])
+    for row, turn in enumerate(truth.cuboids[:, 6:]):
+        np.testing.assert_allclose(read.rotation[row], oracle.quaternion_matrix(turn), atol=1e-12)
+    np.testing.assert_allclose(read.size.prod(axis=1), truth.volume)
+
+
+def test_boxes_that_show_nothing_are_of_no_object(tmp_path):
+    recording, truth, _, _ = written(tmp_path, "false_own_20", 1)
+    read = io.read_true_boxes(tmp_path / "true_boxes.csv", recording.camera)
+    np.testing.assert_array_equal(read.object_id, truth.box_object_id)
+    assert (read.object_id == -1).mean() == pytest.approx(0.2, abs=0.01)

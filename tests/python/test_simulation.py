@@ -8,7 +8,8 @@ import oracle
 from dqslam import _core, load_scenario, simulate
 from dqslam._core import PoseModel
 from dqslam.metrics import position_error
-from dqslam.simulation.simulator import _cube_boxes, _World
+from dqslam.simulation.projection import Polyhedra, Views
+from dqslam.simulation.world import World
 
 PAPER = load_scenario("paper")
 HONEST = load_scenario("honest")
@@ -92,6 +93,30 @@ def test_same_seed_same_bits():
     assert np.abs(once.odometry.relative - other.odometry.relative).max() > 0.01
 
 
+def test_new_kinds_of_errors_leave_the_numbers_of_older_scenarios():
+    recording, truth = paper()
+    numbers = [
+        (recording.odometry.relative[7], [0.5354994614218, 0.0, 0.0317944752467]),
+        (
+            recording.detections.box[11],
+            [141.539971148, 121.634565112, 518.677306327, 449.070723153],
+        ),
+        (recording.positions.object_in_robot[11], [-0.454569581182, 2.22307133431, 0.37730025948]),
+        (truth.center[4], [-3.935317607090, 7.962135029120, -0.355766897287]),
+        (truth.volume[4], 0.358689704542),
+    ]
+    orbit, orbited = simulate(load_scenario("orbit"), seed=3)
+    numbers += [
+        (orbit.odometry.relative[7][:3], [0.00294181204011, -0.0914550853574, -0.0252925192357]),
+        (orbit.detections.box[11], [462.575802901, 229.522193481, 518.427265768, 280.557029125]),
+        (orbited.poses[9][:3], [1.033848838304, 0.661617642278, 0.482700204733]),
+        (orbited.center[4], [0.282518303985, 0.361590198844, 0.0873762192222]),
+    ]
+    for drawn, before in numbers:
+        np.testing.assert_allclose(drawn, before, rtol=1e-9)
+    assert (len(recording.detections), len(orbit.detections)) == (409, 1125)
+
+
 def test_the_kind_of_objects_changes_nothing_but_the_boxes():
     (cubes, true_cubes), (ellipsoids, true_ellipsoids) = paper("cubes"), paper("ellipsoids")
     np.testing.assert_array_equal(cubes.odometry.relative, ellipsoids.odometry.relative)
@@ -154,14 +179,15 @@ def test_detections_are_the_boxes_that_brute_force_finds():
 
 def test_a_cubes_box_bounds_its_corners():
     recording, truth = paper()
-    world = _World(
+    world = World(
         center=np.array([[2.0, 6.0, 0.2], [-3.0, 5.0, -0.4], [0.0, -6.0, 0.0]]),
         side=np.array([0.5, 1.1, 0.4]),
         yaw=np.array([0.3, -2.0, 0.0]),
         semi_axes=np.ones((3, 3)),
         orientation=np.tile([0.0, 0.0, 0.0, 1.0], (3, 1)),
     )
-    boxes, in_front = _cube_boxes(recording.camera, truth, world)
+    views = Views(recording.camera, truth.pose_model, truth.poses)
+    boxes, in_front = Polyhedra(world.cube_corners()).boxes(views)
     for pose in range(40):
         for row in range(3):
             corners = oracle.cube_corners(world.center[row], world.side[row], world.yaw[row])

@@ -1,4 +1,4 @@
-"""The hand-held scenario; what drives on the plane is tested with the simulator."""
+"""Paths in space; what drives on the plane is tested with the simulator."""
 
 import numpy as np
 import pytest
@@ -145,3 +145,50 @@ def test_the_path_has_its_own_numbers(runs):
 def test_an_orbit_through_its_axis_is_refused():
     with pytest.raises(ValueError, match=r"path\.distance_sigma_m: the orbit wobbles through"):
         simulate(changed("path", distance_sigma_m=3.0), seed=0)
+
+
+# --- flights -------------------------------------------------------------------------------------
+
+FLIGHT = load_scenario("flight")
+STEADY = {"roll_sigma_deg": 0.0, "pitch_sigma_deg": 0.0, "yaw_sigma_deg": 0.0}
+
+
+def flown(**values):
+    path = FLIGHT.path.model_copy(update=values)
+    return simulate(FLIGHT.model_copy(update={"path": path}), seed=0)[1].poses
+
+
+def test_a_flight_goes_around_an_ellipse_in_equal_steps():
+    poses = flown(**STEADY)
+    np.testing.assert_allclose((poses[:, 0] / 10.0) ** 2 + (poses[:, 1] / 6.0) ** 2, 1.0, atol=1e-5)
+    np.testing.assert_allclose(poses[[0, -1], :3], [[10.0, 0.0, 3.0]] * 2, atol=1e-6)
+    steps = np.linalg.norm(np.diff(poses[:, :2], axis=0), axis=1)
+    np.testing.assert_allclose(steps, steps.mean(), rtol=2e-3)
+    # Ramanujan: the ellipse is 51.054 m long, and twice that are 340 steps of 0.3 m.
+    assert steps.mean() * len(steps) == pytest.approx(2.0 * 51.054, rel=1e-3)
+    assert len(steps) == 340
+    assert np.ptp(poses[:, 2]) == pytest.approx(2.0, rel=1e-3)
+
+
+def test_a_flight_looks_along_its_path_and_leans_into_the_turn():
+    matrix = matrices(flown(**STEADY))
+    direction = matrix[2:, :3, 3] - matrix[:-2, :3, 3]
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    forward = matrix[1:-1, :3, 0]
+    assert (direction * forward).sum(axis=1).min() > 0.999
+    # Left goes down by the sine of the bank, where the path is level.
+    level = np.abs(forward[:, 2]) < 0.02
+    np.testing.assert_allclose(matrix[1:-1, 2, 1][level], -np.sin(np.deg2rad(15.0)), atol=1e-3)
+
+
+def test_a_flight_wobbles_as_much_as_it_says():
+    steady, free = matrices(flown(**STEADY)), matrices(flown(**STEADY | {"yaw_sigma_deg": 10.0}))
+    turned = np.einsum("nji,njk->nik", steady[:, :3, :3], free[:, :3, :3])
+    angle = Rotation.from_matrix(turned).magnitude()
+    assert np.rad2deg(np.sqrt((angle**2).mean())) == pytest.approx(10.0, rel=0.35)
+    assert np.rad2deg(np.abs(np.diff(angle)).max()) < 2.0
+
+
+def test_the_part_of_a_lap():
+    poses = flown(laps=0.5, **STEADY)
+    np.testing.assert_allclose(poses[-1, :3], [-10.0, 0.0, 3.0], atol=1e-4)

@@ -3,6 +3,7 @@ from pathlib import Path
 import pytest
 
 from dqslam.simulation.scenario import load_scenario
+from dqslam.studies.worlds import all_worlds
 
 PAPER = Path(__file__).parents[2] / "data" / "scenarios" / "paper.toml"
 
@@ -75,7 +76,7 @@ def test_objects_can_be_chosen(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ('objects = "cubes"', 'objects = "spheres"', r"objects: Input should be 'cubes' or 'ell"),
+        ('objects = "cubes"', 'objects = "spheres"', r"objects: Input should be 'cubes', 'ell"),
         ("laps = 2", "laps = 0", r"path\.laps: .* greater than or equal to 1"),
         ("laps = 2", "laps = 2.5", r"path\.laps: .* integer"),
         ("laps = 2", "", r":7: path\.laps is missing$"),
@@ -113,3 +114,46 @@ def test_odometry_is_of_the_paths_kind(tmp_path):
     path.write_text(before + "[odometry]" + paper_odometry + "[" + after.partition("[")[2])
     with pytest.raises(ValueError, match=r"odometry\.kind: expected 'spatial' with path.kind 'orb"):
         load_scenario(path)
+
+
+# --- the battery of worlds -----------------------------------------------------------------------
+
+
+def test_a_section_of_another_kind_replaces_the_bases(tmp_path):
+    path = tmp_path / "near.toml"
+    path.write_text(
+        'base = "paper"\n[path]\nkind = "straight"\nlength_m = 9.0\nstep_m = 0.5\nperiod_s = 1.0\n'
+    )
+    near = load_scenario(path)
+    assert near.path.model_dump() == {
+        "kind": "straight",
+        "length_m": 9.0,
+        "step_m": 0.5,
+        "period_s": 1.0,
+    }
+    assert near.odometry == load_scenario("paper").odometry
+    path.write_text('base = "paper"\n[path]\nkind = "straight"\nlength_m = 9.0\n')
+    with pytest.raises(ValueError, match=r"path\.step_m is missing\n.*path\.period_s is missing"):
+        load_scenario(path)
+
+
+def test_each_world_of_the_battery_is_a_scenario_with_a_title():
+    names = {path.stem for path in (PAPER.parent / "worlds").glob("*.toml")}
+    assert names == set(all_worlds())
+    assert len(all_worlds()) == len(names)
+    titles = {load_scenario(name).title for name in names}
+    assert len(titles) == len(names)
+    assert "" not in titles
+
+
+def test_a_world_of_the_battery_differs_from_its_base_where_it_says():
+    loop = load_scenario("loop")
+    assert loop.model_copy(update={"title": "", "name": "paper", "objects": "cubes"}) == (
+        load_scenario("paper")
+    )
+    for name, section in [("odometry_x4", "odometry"), ("occlusion", "detector"), ("focal_2", "")]:
+        world = load_scenario(name)
+        assert world.path == loop.path
+        assert (world.odometry != loop.odometry) == (section == "odometry")
+        assert (world.detector != loop.detector) == (section == "detector")
+        assert (world.calibration != loop.calibration) == (section == "")

@@ -117,7 +117,7 @@ scenario.odometry.translation_sigma_m = 3
         load_sweep(path)
     said = str(caught.value).replace(f"{path}:", "").splitlines()
     for mistake in (
-        "4: scenario.objects: Input should be 'cubes' or 'ellipsoids', not 'spheres'",
+        "4: scenario.objects: Input should be 'cubes', 'ellipsoids' or 'cuboids', not 'spheres'",
         "7: unknown key scenario.odometry.rotation_sigma; did you mean rotation_sigma_rad?",
         "10: estimator.max_iterations: expected values, like [1, 2]",
         "11: scenario.detector.min_side_px: 50.0 occurs twice",

@@ -23,13 +23,14 @@ from dqslam.cli.run import run
 from dqslam.cli.simulate import simulate
 from dqslam.cli.sweep import sweep
 from dqslam.cli.view import view
+from dqslam.cli.worlds import worlds
 
 # The commands in the order of the help, by the title of their panel.
 COMMANDS: dict[str, tuple[Callable[..., None], ...]] = {
     "Start here": (demo, paper, simulate),
     "Your recording": (inspect, convert, run, evaluate),
     "Look": (plot, view),
-    "Study": (sweep, ablation, degeneracy),
+    "Study": (sweep, worlds, ablation, degeneracy),
 }
 EXIT_CODES = {
     0: "done",

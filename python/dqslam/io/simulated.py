@@ -57,18 +57,24 @@ def save_recording(recording: Recording, directory: str | Path) -> None:
 def save_truth(truth: Truth, recording: Recording, directory: str | Path) -> None:
     """Write groundtruth.txt, objects.csv and true_boxes.csv, for `dqslam evaluate`.
 
-    An object that is not an ellipsoid has the size of a cube of its volume, and no orientation.
+    An object that is neither an ellipsoid nor a cuboid has the size of a cube of its volume, and no
+    orientation.
     """
     directory = Path(directory)
     _write_path(directory / "groundtruth.txt", recording, truth.pose_model, truth.poses)
     names = ["object_id", "class_name", "x", "y", "z", "sx", "sy", "sz"]
     columns: list[Sequence[object]] = [truth.object_id.tolist(), truth.class_name]
-    if truth.ellipsoids is None:
-        numbers = np.column_stack([truth.center, *[np.cbrt(truth.volume)] * 3])
-    else:
-        names += ["qx", "qy", "qz", "qw"]
+    quaternion = ["qx", "qy", "qz", "qw"]
+    if truth.ellipsoids is not None:
+        names += quaternion
         rows = [_core.axes_from_ellipsoid(ellipsoid) for ellipsoid in truth.ellipsoids]
         numbers = np.array([[*center, *2.0 * axes, *turn] for center, axes, turn in rows])
+    elif truth.cuboids is not None:
+        names += quaternion
+        center, half, turn = np.split(truth.cuboids, [3, 6], axis=1)
+        numbers = np.column_stack([center, 2.0 * half, turn])
+    else:
+        numbers = np.column_stack([truth.center, *[np.cbrt(truth.volume)] * 3])
     columns += _columns(numbers)
     _write_table(directory / "objects.csv", names, columns)
     boxes = recording.detections

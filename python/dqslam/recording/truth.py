@@ -27,8 +27,11 @@ class Truth:
     """One per object."""
     ellipsoids: Floats | None = None
     """Center and log-Cholesky shape, shape (o, 9); None if the objects are no ellipsoids."""
+    cuboids: Floats | None = None
+    """Center, half the sides, and world_from_object as a quaternion, of cuboids with three different
+    sides; shape (o, 10)."""
     box_object_id: Ints | None = None
-    """True object of each box of the recording, independent of its id; shape (m,)."""
+    """True object of each box of the recording, independent of its id; -1 for none; shape (m,)."""
 
     def __post_init__(self) -> None:
         """Check shapes and numbers."""
@@ -43,10 +46,13 @@ class Truth:
         ellipsoids = self.ellipsoids
         if ellipsoids is not None:
             ellipsoids = as_floats("truth.ellipsoids", ellipsoids, [count, 9])
+        cuboids = self.cuboids
+        if cuboids is not None:
+            cuboids = as_floats("truth.cuboids", cuboids, [count, 10])
         box_object_id = self.box_object_id
         if box_object_id is not None:
             box_object_id = as_ints("truth.box_object_id", box_object_id)
-            unknown = ~np.isin(box_object_id, object_id)
+            unknown = ~np.isin(box_object_id, [-1, *object_id])
             reject_rows("truth.box_object_id", unknown, "no such object", box_object_id)
         assign(
             self,
@@ -56,6 +62,7 @@ class Truth:
             volume=volume,
             class_name=tuple(self.class_name),
             ellipsoids=ellipsoids,
+            cuboids=cuboids,
             box_object_id=box_object_id,
         )
 

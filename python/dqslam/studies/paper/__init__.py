@@ -11,6 +11,7 @@ from dqslam.studies.paper.methods import assumptions_of as assumptions_of
 from dqslam.studies.paper.methods import default_loss as default_loss
 from dqslam.studies.paper.methods import method_options as method_options
 from dqslam.studies.paper.methods import seen_by as seen_by
+from dqslam.studies.paper.methods import true_assumptions as true_assumptions
 from dqslam.studies.paper.paper import example_maps as example_maps
 from dqslam.studies.paper.paper import run_paper as run_paper
 from dqslam.studies.paper.table import METRICS as METRICS

@@ -47,8 +47,8 @@ class Settings:
 
 
 def default_loss(scenario: Scenario, method: Method) -> LossName:
-    """Return a robust loss if ids are wrong, and none for right ids or the paper's method."""
-    is_robust = scenario.detector.wrong_associations > 0.0 and method == "dqslam"
+    """Return a robust loss if some boxes show something else, and none for the paper's method."""
+    is_robust = scenario.detector.shows_wrong_objects and method == "dqslam"
     return ROBUST_LOSS if is_robust else "none"
 
 
@@ -94,9 +94,14 @@ def assumptions_of(scenario: Scenario, settings: Settings) -> Assumptions:
     are the sigmas of the detector and of the world. For cubes there are no right sigmas.
     """
     if settings.bound and scenario.objects == "ellipsoids":
-        noise = BoxNoise(pixels=scenario.detector.edge_sigma_px, relative=0.0)
-        return Assumptions(noise, true_size_prior(scenario.world))
+        return true_assumptions(scenario)
     return Assumptions()
+
+
+def true_assumptions(scenario: Scenario) -> Assumptions:
+    """Return the true error of the edges of boxes, and the true spread of the sizes."""
+    noise = BoxNoise(pixels=scenario.detector.edge_rms_px, relative=0.0)
+    return Assumptions(noise, true_size_prior(scenario.world))
 
 
 def true_size_prior(world: WorldSettings) -> SizePrior:
@@ -106,6 +111,12 @@ def true_size_prior(world: WorldSettings) -> SizePrior:
     size = world.log_normal_size
     if size is not None:
         return SizePrior(float(np.log(size.median_m)), float(np.log(size.spread)))
+    shape = world.proportions
+    if shape is not None:
+        unlike = np.log(shape.ratio).std()  # of the semi-axes of one object
+        return SizePrior(
+            float(np.log(shape.median_m)), float(np.hypot(np.log(shape.spread), unlike))
+        )
     shares = (np.arange(1000) + 0.5) / 1000.0  # quantiles stand for the distribution
     side = world.side_mean_m + world.side_sigma_m * norm.ppf(shares)
     log_side = np.log(np.maximum(side, world.side_min_m))

@@ -8,7 +8,7 @@ import numpy as np
 
 from dqslam import _core
 from dqslam._checks import Bools
-from dqslam._core import SolveOptions, Summary
+from dqslam._core import Loss, SolveOptions, Summary
 from dqslam.estimate import Estimate
 from dqslam.graph import Graph, solve
 from dqslam.metrics import mean_distance, position_error, true_rows
@@ -41,6 +41,8 @@ class BoundScore:
     """Mean of the same quantity over the centers of the mapped objects (3 degrees of freedom)."""
     is_optimum: bool
     """Whether a start at the truth does not reach a lower cost."""
+    excess_cost: float = float("nan")
+    """Final cost less that of the same solve that starts at the truth."""
 
 
 @dataclass(frozen=True)
@@ -70,21 +72,35 @@ def score_bound(
 
     `right_graph` is the problem without the boxes whose id is wrong.
     """
-    estimate, summary = solved
+    estimate, _ = solved
     covariance = marginal_covariances(graph, estimate, options)
     pose_error = _core.minus(truth.pose_model, truth.poses, estimate.poses)[1:]
     pose_nees = normalized_squares(pose_error, covariance.poses[1:])
-    rows = true_rows(estimate.object_ids, truth)
-    center_nees = normalized_squares(truth.center[rows] - estimate.centers, covariance.centers)
-    _, from_truth = solve(graph, options, start=true_state(graph, truth, options))
+    exists = np.isin(estimate.object_ids, truth.object_id)
+    rows = true_rows(estimate.object_ids[exists], truth)
+    center_error = truth.center[rows] - estimate.centers[exists]
+    center_nees = normalized_squares(center_error, covariance.centers[exists])
+    cost = truncated_cost(solved, options)
+    from_truth = solve(graph, options, start=true_state(graph, truth, options))
+    best_cost = truncated_cost(from_truth, options)
     return BoundScore(
         bound=posterior_bound(right_graph, truth).position_error,
         last_pose_nees=float(pose_nees[-1]),
         pose_nees=float(pose_nees.mean()),
         pose_dof=pose_error.shape[1],
         center_nees=float(np.nanmean(center_nees)),  # NaN for an object that is undetermined
-        is_optimum=bool(summary.final_cost <= from_truth.final_cost + SAME_COST),
+        is_optimum=cost <= best_cost + SAME_COST,
+        excess_cost=cost - best_cost,
     )
+
+
+def truncated_cost(solved: tuple[Estimate, Summary], options: SolveOptions) -> float:
+    """Return the cost; each box without a weight counts as much as one at the threshold does."""
+    estimate, summary = solved
+    if options.loss not in (Loss.GNC_TLS, Loss.GNC_GM):
+        return summary.final_cost
+    assert estimate.inliers is not None
+    return summary.final_cost + 0.5 * options.outlier_chi_square * float(np.sum(~estimate.inliers))
 
 
 def score_robust(

@@ -125,7 +125,7 @@ class TrialSettings(_Settings):
         """Return every setting that the result of a trial depends on, including defaults."""
         options = self.options()
         return {
-            "scenario": self.scenario.model_dump(mode="json", exclude={"name"}),
+            "scenario": self.scenario.model_dump(mode="json", exclude={"name", "title"}),
             "estimator": {
                 "method": self.estimator.method,
                 "input": self.estimator.input,

@@ -1,35 +1,10 @@
-"""A simulated detector: the objects that get a box, how it is cut, and the id that it has."""
+"""The ids that a tracker gives to boxes, some of them wrong."""
 
 import numpy as np
 from numpy.random import Generator
 
-from dqslam._checks import Bools, Floats, Ints
-from dqslam._core import Camera
+from dqslam._checks import Floats, Ints
 from dqslam.simulation.scenario import DetectorSettings
-
-
-def cut_at_border(box: Floats, camera: Camera) -> tuple[Floats, Bools]:
-    """Cut boxes (..., 4) at the border of the image, and flag the edges that moved."""
-    first = np.full(4, -0.5)
-    last = np.array([camera.width, camera.height] * 2) - 0.5
-    outside = (box < first) | (box > last)
-    return np.clip(box, first, last), outside
-
-
-def is_detected(box: Floats, camera: Camera, settings: DetectorSettings) -> Bools:
-    """Return which exact boxes (..., 4) are detected; NaN is not.
-
-    The longer side of the part inside the image must exceed `min_side_px`. With "discard" the whole
-    box must be inside; with "clip" at least `min_visible_fraction` of its area must be.
-    """
-    inside, is_cut = cut_at_border(box, camera)
-    size = inside[..., 2:] - inside[..., :2]
-    large = size.max(axis=-1) > settings.min_side_px
-    if settings.truncation == "discard":
-        return np.asarray(large & ~is_cut.any(axis=-1))
-    whole = box[..., 2:] - box[..., :2]
-    enough = size.prod(axis=-1) >= settings.min_visible_fraction * whole.prod(axis=-1)
-    return np.asarray(large & enough)
 
 
 def associate(
@@ -62,3 +37,31 @@ def associate(
         else:
             said[row] = others[int(which[row] * len(others))]
     return said
+
+
+def switch_in_bursts(
+    said: Ints, object_row: Ints, settings: DetectorSettings, random: Generator
+) -> Ints:
+    """Return the said rows (m,) with runs of boxes in a row that have another detected object's.
+
+    The boxes of each object, in the order of time, are cut into runs of the burst's length, the
+    first of which starts at random; each run is switched as a whole.
+
+    Parameters
+    ----------
+    said, object_row
+        What the ids say and what the boxes show, in the order of the poses, shape (m,).
+    """
+    switched = said.copy()
+    detected = np.unique(object_row)
+    if settings.burst_share == 0.0 or len(detected) < 2:
+        return switched
+    for shown in detected.tolist():
+        rows = np.flatnonzero(object_row == shown)
+        offset = int(random.integers(settings.burst_length))
+        run = (np.arange(len(rows)) + offset) // settings.burst_length
+        is_wrong = random.random(run[-1] + 1) < settings.burst_share
+        others = detected[detected != shown]
+        other = random.choice(others, size=run[-1] + 1)
+        switched[rows] = np.where(is_wrong[run], other[run], said[rows])
+    return switched
