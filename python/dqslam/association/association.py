@@ -10,6 +10,7 @@ import numpy as np
 from dqslam import _core
 from dqslam._checks import Bools, Ints, reject_rows, require
 from dqslam._repr import counted
+from dqslam.association.first_levels import first_levels, look
 from dqslam.association.follow import Follower
 from dqslam.association.initiation import MIN_VIEWS
 from dqslam.association.keyframes import choose_keyframes
@@ -146,14 +147,18 @@ def associate(
     thin = thin_recording(recording, keyframes)
     labels = Labels.of(thin.detections, tracklets[used])
     labels.make_room(tracklets=int(tracklets.max(initial=-1)) + 1)
+    noise = StepNoise.between(recording, keyframes) if estimates_noise else None
     scene = SceneMap(
         thin,
         labels,
         box_noise=box_noise or BoxNoise(),
         size_prior=size_prior,
-        step_noise=StepNoise.between(recording, keyframes) if estimates_noise else None,
+        step_noise=noise,
+        levels=None if noise is None else first_levels(noise, look(thin, tracklets[used], keyframes)),
         mode=mode,
     )
+    import os
+    if os.environ.get("DBG"): print(len(keyframes), look(thin, tracklets[used], keyframes), scene.odometry_noise, scene.levels)
     follower = Follower(trust=trust)
     follower.follow(scene, lambda share: progress(0.7 * share))
     refine(scene, follower, lambda share: progress(0.7 + 0.2 * share))

@@ -1,8 +1,11 @@
 """How good the odometry is, estimated from how well it agrees with the boxes.
 
-Variance components: the squared residuals of a group of measurements sum to its redundancy, which
-is their number less what they determine themselves (Foerstner 1979). Where the sum is larger, the
-group is worse than believed, and the estimate is made again with the standard deviation corrected.
+The covariance of a step is a sum of components: a shape, known from the step, times the square of a
+level that is not. Residuals r of an estimate, whitened by what was believed, and their leverages h
+are those of an independent measurement of the error of each step, r / (1 - h), with variance
+h / (1 - h) beside that of the step. The levels of greatest likelihood have the sum of squares that
+is expected, of all residuals, each with the share of its variance that a component has: variance
+components (Foerstner 1979; restricted maximum likelihood). Then the estimate is made again.
 """
 
 from __future__ import annotations
@@ -10,44 +13,101 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from dqslam import _core
-from dqslam._checks import Floats, Ints
+from dqslam._checks import Bools, Floats, Ints
 from dqslam.association.thinning import compose_covariance
 from dqslam.assumptions import OdometryNoise
 from dqslam.recording import Recording
 
-# A group must outweigh this many residuals that agree with the level believed: few change little.
+# A component must outweigh this many residuals that agree with its kind.
 PRIOR_RESIDUALS = 1.0
-# Meters and radians a step; less is no noise that boxes could show.
-MIN_SIGMA = 1e-6
+# Less than this share of what a component was is no noise that boxes could show.
+MIN_RATIO = 1e-6
+# Iterations of the likelihood for fixed residuals: a level that rises or falls needs a few.
+MAX_ITERATIONS = 30
+# A step over a gap in time, so many times the usual interval, is as uncertain as the intervals in it.
+MIN_GAP = 3.0
+# A jump: noise would be so far off once in a million steps. By degrees of freedom, 0 to 6.
+JUMP_CHI2 = np.array([np.inf, 23.93, 27.63, 30.66, 33.38, 35.89, 38.26])
 
 
 @dataclass(frozen=True)
 class StepNoise:
-    """Covariance of the motion between keyframes, as a sum of two unknown levels."""
+    """Covariance of the motion between keyframes, as a sum of unknown levels."""
 
-    per_translation: Floats
-    """For a sigma of 1 m a step, shape (n - 1, k, k)."""
-    per_rotation: Floats
-    """For a sigma of 1 rad a step, shape (n - 1, k, k)."""
+    names: tuple[str, ...]
+    """Of the components, c of them."""
+    units: Floats
+    """Covariance of each motion for a level of 1, shape (c, n - 1, k, k)."""
+    of_step: Floats
+    """Mean variance of a step along an axis and about one, for a level of 1, shape (c, 2)."""
+
+    @classmethod
+    def isotropic(cls, per_translation: Floats, per_rotation: Floats) -> StepNoise:
+        """Have one level of translation and one of rotation, (n - 1, k, k), of 1 m and 1 rad."""
+        units = np.stack([per_translation, per_rotation])
+        return cls(("translation", "rotation"), units, np.eye(2))
 
     @classmethod
     def between(cls, recording: Recording, keyframes: Ints) -> StepNoise:
-        """Carry the noise of single steps on to the keyframes."""
-        steps, k, _ = recording.odometry.covariance.shape
-        translation = np.arange(k) < translation_axes(k)
-        units = (
-            np.tile(np.diag(part * 1.0), (steps, 1, 1)) for part in (translation, ~translation)
-        )
-        return cls(*(compose_covariance(recording, unit, keyframes) for unit in units))
+        """Take the components of single steps, and carry them on to the keyframes.
 
-    def covariance(self, noise: OdometryNoise) -> Floats:
-        """Return the covariances for a level of the noise, shape (n - 1, k, k)."""
-        return np.asarray(
-            noise.translation_m**2 * self.per_translation
-            + noise.rotation_rad**2 * self.per_rotation
+        A level for each axis, [m] and [rad] a step or, across a gap, a usual interval, and one of
+        the length and of the angle that a step moves, as a share of them.
+        """
+        translations, rotation = motions(recording)
+        steps, k, _ = recording.odometry.covariance.shape
+        t = translation_axes(k)
+        gap = gaps(recording.timestamps)
+        axes = gap[:, None, None] * np.einsum("ca,cb->cab", np.eye(k), np.eye(k))[:, None]
+        moved = np.zeros((2, steps, k))
+        moved[0, :, :t], moved[1, :, t:] = translations, rotation
+        single = np.concatenate([axes, np.einsum("csa,csb->csab", moved, moved)])
+        names = [f"translation_{axis}" for axis in "xyz"[:t]]
+        names += [f"rotation_{axis}" for axis in "xyz"[3 - (k - t) :]]
+        variance = np.einsum("csaa->ca", single) / max(steps, 1)
+        return cls(
+            (*names, "length", "angle"),
+            np.stack([compose_covariance(recording, unit, keyframes) for unit in single]),
+            np.column_stack([variance[:, :t].mean(axis=1), variance[:, t:].mean(axis=1)]),
         )
+
+    @property
+    def is_rotation(self) -> Bools:
+        """Which components are rotations, shape (c,)."""
+        return np.asarray(self.of_step[:, 1] > self.of_step[:, 0])
+
+    def covariance(self, levels: Floats, inflation: Floats | float = 1.0) -> Floats:
+        """Return the covariances for some levels (c,), shape (n - 1, k, k).
+
+        That of a jump is inflated, shape (n - 1,).
+        """
+        sum_of_all = np.einsum("c,csab->sab", levels**2, self.units)
+        return np.asarray(np.broadcast_to(inflation, len(sum_of_all))[:, None, None] * sum_of_all)
+
+    def typical(self, levels: Floats) -> OdometryNoise:
+        """Return the root mean square of a step for some levels (c,)."""
+        return OdometryNoise(*np.sqrt(levels**2 @ self.of_step).tolist())
+
+
+def motions(recording: Recording) -> tuple[Floats, Floats]:
+    """Return how each step moves, (s, t), and turns, (s, r), in the frame of its end."""
+    relative = recording.odometry.relative
+    back = _core.inverse(recording.odometry.pose_model, relative)
+    if recording.odometry.pose_model == _core.PoseModel.SE2:
+        return -back[:, :2], relative[:, 2:]
+    return -back[:, :3], Rotation.from_quat(relative[:, 3:]).as_rotvec()
+
+
+def gaps(timestamps: Floats) -> Floats:
+    """Return how many usual intervals each step takes, 1 unless there is a gap, shape (s,)."""
+    interval = np.diff(timestamps)
+    if not interval.size or np.median(interval) <= 0.0:
+        return np.ones(len(interval))
+    ratio = interval / np.median(interval)
+    return np.where(ratio > MIN_GAP, ratio, 1.0)
 
 
 def translation_axes(k: int) -> int:
@@ -55,16 +115,96 @@ def translation_axes(k: int) -> int:
     return k // 2 + k % 2
 
 
-def corrected(noise: OdometryNoise, fit: _core.Fit) -> OdometryNoise:
-    """Return a better level of the noise, from the residuals of an estimate that believed one."""
-    k = fit.odometry_residuals.shape[1]
-    better = []
-    for value, part in (
-        (noise.translation_m, slice(0, translation_axes(k))),
-        (noise.rotation_rad, slice(translation_axes(k), k)),
-    ):
-        squares = np.sum(fit.odometry_residuals[:, part] ** 2)
-        redundancy = np.sum(1.0 - fit.odometry_leverage[:, part])
-        factor = np.sqrt((squares + PRIOR_RESIDUALS) / (redundancy + PRIOR_RESIDUALS))
-        better.append(max(value * float(factor), MIN_SIGMA))
-    return OdometryNoise(*better)
+@dataclass(frozen=True)
+class Correction:
+    """Better levels of the noise, and how far that is from what was believed."""
+
+    levels: Floats
+    inflation: Floats
+    change: float
+    """Mean logarithm of the factor of sigma, over all that residuals say something of."""
+
+
+def corrected(
+    noise: StepNoise, levels: Floats, inflation: Floats, fit: _core.Fit, *, lowest: Floats
+) -> Correction:
+    """Return better levels from the residuals of an estimate that believed some.
+
+    It had the motions up to its last pose, the first of them. No level becomes lower than its
+    ``lowest``, shape (c,).
+    """
+    steps = len(fit.odometry_residuals)
+    believed = noise.covariance(levels, inflation)[:steps]
+    whitener = np.linalg.inv(np.linalg.cholesky(believed))
+    part = np.einsum("sia,csab,sib->csi", whitener, noise.units[:, :steps], whitener)
+    part *= (levels**2)[:, None, None]  # of the variance of each residual, if nothing changes
+    squares = fit.odometry_residuals**2
+    leverage = np.clip(fit.odometry_leverage, 0.0, 1.0)
+    redundancy = 1.0 - leverage
+    counted = redundancy.sum(axis=1) > 0.0
+
+    factors = np.ones(len(levels))
+    jumps = np.zeros(steps, dtype=np.bool_)
+    for _ in range(3):
+        used = counted & ~jumps
+        factors = _most_likely(
+            part[:, used], squares[used], redundancy[used], leverage[used], noise.is_rotation
+        )
+        variance = np.einsum("c,csi->si", factors, part)
+        found = ~jumps & _is_jump(variance, squares, redundancy, leverage)
+        if not found.any():
+            break
+        jumps |= found
+    now = inflation.copy()
+    now[:steps] = 1.0
+    for step in np.flatnonzero(jumps):
+        now[step] = _inflate(variance[step], squares[step], redundancy[step], leverage[step])
+    ratio = np.einsum("c,csi->si", factors, part) * now[:steps, None]
+    change = np.sum(redundancy * np.abs(np.log(ratio))) / (2.0 * max(redundancy.sum(), 1e-9))
+    return Correction(np.maximum(levels * np.sqrt(factors), lowest), now, float(change))
+
+
+def _most_likely(
+    part: Floats, squares: Floats, redundancy: Floats, leverage: Floats, is_rotation: Bools
+) -> Floats:
+    """Return the factors (c,) of the components' variances, of greatest posterior."""
+    # First one factor for all translations, and one for all rotations: what little is seen of a
+    # component is taken to be as the others of its kind.
+    kinds = np.stack([part[~is_rotation].sum(axis=0), part[is_rotation].sum(axis=0)])
+    pooled = _climb(kinds, squares, redundancy, leverage, np.ones(2), np.ones(2))
+    prior = np.where(is_rotation, pooled[1], pooled[0])
+    return _climb(part, squares, redundancy, leverage, prior, prior)
+
+
+def _climb(
+    part: Floats, squares: Floats, redundancy: Floats, leverage: Floats, start: Floats, prior: Floats
+) -> Floats:
+    factors = start.copy()
+    for _ in range(MAX_ITERATIONS):
+        total = np.einsum("c,csi->si", factors, part) * redundancy + leverage
+        found = np.einsum("csi,si->c", part, squares / total**2)
+        expected = np.einsum("csi,si->c", part, redundancy / total)
+        step = (factors * found + PRIOR_RESIDUALS * prior / factors) / (
+            factors * expected + PRIOR_RESIDUALS
+        )
+        factors = np.maximum(factors * step, MIN_RATIO)
+        if np.abs(np.log(step)).max() < 1e-2:
+            break
+    return factors
+
+
+def _is_jump(variance: Floats, squares: Floats, redundancy: Floats, leverage: Floats) -> Bools:
+    shown = redundancy > 0.05
+    chi2 = squares / np.maximum(redundancy * (variance * redundancy + leverage), 1e-300)
+    return np.asarray(np.sum(np.where(shown, chi2, 0.0), axis=1) > JUMP_CHI2[shown.sum(axis=1)])
+
+
+def _inflate(variance: Floats, squares: Floats, redundancy: Floats, leverage: Floats) -> float:
+    """Return the factor of a step's variance for which its residuals are what is expected."""
+    factor = 1.0
+    shown = redundancy > 0.05
+    v, s, q, h = (a[shown] for a in (variance, squares, redundancy, leverage))
+    for _ in range(100):
+        total = factor * v * q + h
+        factor *= float(np.sum(v * s / total**2) / np.sum(v * q / total))
+    return max(factor, 1.0)

@@ -22,6 +22,8 @@ ANY_SIZE = SizePrior(log_mean=float(np.log(0.3)), log_sigma=1.5)
 LEARNED_LOG_SIZE_SIGMA = 0.7
 # The size of objects is learned from so many of them at least: the median of two is no size.
 MIN_OBJECTS_TO_LEARN_SIZE = 3
+# A level falls to this share of the first at most: less is no noise that boxes could show.
+LOWEST_SHARE = 1e-3
 
 
 class SceneMap:
@@ -35,7 +37,7 @@ class SceneMap:
         box_noise: BoxNoise,
         size_prior: SizePrior | SizePriors | None = None,
         step_noise: StepNoise | None = None,
-        odometry_noise: OdometryNoise | None = None,
+        levels: Floats | None = None,
         mode: _core.Mode = _core.Mode.SLAM,
     ) -> None:
         """Start at the first pose, without objects.
@@ -47,8 +49,8 @@ class SceneMap:
         size_prior
             By default it is learned from the objects found.
         step_noise
-            By default the covariance of the recording's odometry is believed; else its level is
-            estimated, from ``odometry_noise`` on.
+            By default the covariance of the recording's odometry is believed; else the levels of
+            its components are estimated, from ``levels`` on, shape (c,).
         mode
             MAPPING takes the odometry for the truth.
         """
@@ -65,7 +67,10 @@ class SceneMap:
         self.learns_size = size_prior is None
         self.size_prior = ANY_SIZE if size_prior is None else size_prior
         self.step_noise = step_noise
-        self.odometry_noise = odometry_noise or OdometryNoise()
+        self.levels = np.zeros(0) if levels is None else levels
+        self.lowest_levels = LOWEST_SHARE * self.levels
+        self.inflation = np.ones(len(recording.odometry.relative))
+        """Factors of the covariances of jumps, shape (n - 1,)."""
         self._believe_noise()
         self.poses: Floats = recording.odometry.first_pose[None]
         self.ellipsoids = np.zeros((0, 9))
@@ -139,17 +144,23 @@ class SceneMap:
         solution = _core.solve(graph.core, self._options(max_iterations), self.state(graph))
         return solution.summary.final_cost, solution.poses
 
+    @property
+    def odometry_noise(self) -> OdometryNoise | None:
+        """Root mean square of the noise of a step, where that is estimated."""
+        return None if self.step_noise is None else self.step_noise.typical(self.levels)
+
     def estimate_noise(self) -> float:
-        """Correct the level of the odometry's noise; return the factor it changed by, as a log."""
+        """Correct the levels of the odometry's noise; return how far they changed, as a log."""
         graph = self.graph()
         if self.step_noise is None or graph is None or self.mode == _core.Mode.MAPPING:
             return 0.0
         fit = _core.fit(graph.core, self._options(), self.state(graph))
-        before, self.odometry_noise = self.odometry_noise, corrected(self.odometry_noise, fit)
+        better = corrected(
+            self.step_noise, self.levels, self.inflation, fit, lowest=self.lowest_levels
+        )
+        self.levels, self.inflation = better.levels, better.inflation
         self._believe_noise()
-        ratio = np.array([self.odometry_noise.translation_m, self.odometry_noise.rotation_rad])
-        ratio /= [before.translation_m, before.rotation_rad]
-        return float(np.abs(np.log(ratio)).max())
+        return better.change
 
     def joint_covariance(self, pose: int, object_rows: Ints) -> tuple[Ints, Floats]:
         """Return which of some objects take part, and their covariance together with a pose's.
@@ -219,7 +230,7 @@ class SceneMap:
     def _believe_noise(self) -> None:
         if self.step_noise is None:
             return
-        covariance = self.step_noise.covariance(self.odometry_noise)
+        covariance = self.step_noise.covariance(self.levels, self.inflation)
         odometry = replace(self.recording.odometry, covariance=covariance)
         self.recording = replace(self.recording, odometry=odometry)
 
