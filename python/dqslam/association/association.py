@@ -17,7 +17,7 @@ from dqslam.association.keyframes import choose_keyframes
 from dqslam.association.labels import Labels
 from dqslam.association.noise import StepNoise
 from dqslam.association.refine import reassign, refine
-from dqslam.association.scene_map import SceneMap
+from dqslam.association.scene_map import ANY_SIZE, SceneMap
 from dqslam.association.thinning import fill_in, thin_recording
 from dqslam.association.tracklets import link_tracklets
 from dqslam.assumptions import BoxNoise, SizePrior, SizePriors
@@ -148,13 +148,15 @@ def associate(
     labels = Labels.of(thin.detections, tracklets[used])
     labels.make_room(tracklets=int(tracklets.max(initial=-1)) + 1)
     noise = StepNoise.between(recording, keyframes) if estimates_noise else None
+    seen = look(thin, tracklets[used], keyframes)
     scene = SceneMap(
         thin,
         labels,
         box_noise=box_noise or BoxNoise(),
         size_prior=size_prior,
         step_noise=noise,
-        levels=None if noise is None else first_levels(noise, look(thin, tracklets[used], keyframes)),
+        first_size=ANY_SIZE if seen is None else replace(ANY_SIZE, log_mean=seen.log_size),
+        levels=None if noise is None else first_levels(noise, seen),
         mode=mode,
     )
     import os

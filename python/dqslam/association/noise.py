@@ -23,8 +23,10 @@ from dqslam.recording import Recording
 
 # A component must outweigh this many residuals that agree with its kind.
 PRIOR_RESIDUALS = 1.0
-# Less than this share of what a component was is no noise that boxes could show.
-MIN_RATIO = 1e-6
+# Variances change by this factor at most: residuals far from what was believed tell little of it.
+MAX_RATIO = 100.0
+# Variances change by this factor at most from one iteration of the likelihood to the next.
+MAX_STEP = 4.0
 # Iterations of the likelihood for fixed residuals: a level that rises or falls needs a few.
 MAX_ITERATIONS = 30
 # A step over a gap in time, so many times the usual interval, is as uncertain as the intervals in it.
@@ -187,7 +189,8 @@ def _climb(
         step = (factors * found + PRIOR_RESIDUALS * prior / factors) / (
             factors * expected + PRIOR_RESIDUALS
         )
-        factors = np.maximum(factors * step, MIN_RATIO)
+        step = np.clip(step, 1.0 / MAX_STEP, MAX_STEP)
+        factors = np.clip(factors * step, 1.0 / MAX_RATIO, MAX_RATIO)
         if np.abs(np.log(step)).max() < 1e-2:
             break
     return factors

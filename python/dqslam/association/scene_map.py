@@ -36,6 +36,7 @@ class SceneMap:
         *,
         box_noise: BoxNoise,
         size_prior: SizePrior | SizePriors | None = None,
+        first_size: SizePrior = ANY_SIZE,
         step_noise: StepNoise | None = None,
         levels: Floats | None = None,
         mode: _core.Mode = _core.Mode.SLAM,
@@ -47,7 +48,7 @@ class SceneMap:
         labels
             Of the boxes of the recording; the map changes them.
         size_prior
-            By default it is learned from the objects found.
+            By default it is learned from the objects found, from ``first_size`` on.
         step_noise
             By default the covariance of the recording's odometry is believed; else the levels of
             its components are estimated, from ``levels`` on, shape (c,).
@@ -65,7 +66,7 @@ class SceneMap:
         self.box_covariance = box_noise.covariance(detections.box)
         self.mode = mode
         self.learns_size = size_prior is None
-        self.size_prior = ANY_SIZE if size_prior is None else size_prior
+        self.size_prior = first_size if size_prior is None else size_prior
         self.step_noise = step_noise
         self.levels = np.zeros(0) if levels is None else levels
         self.lowest_levels = LOWEST_SHARE * self.levels
