@@ -21,14 +21,16 @@ from dqslam.association.thinning import compose_covariance
 from dqslam.assumptions import OdometryNoise
 from dqslam.recording import Recording
 
+import os
 # A component must outweigh this many residuals that agree with its kind.
-PRIOR_RESIDUALS = 1.0
+PRIOR_RESIDUALS = float(os.environ.get("PR","1"))
 # Variances change by this factor at most: residuals far from what was believed tell little of it.
+SPREAD_OF_KIND=float(os.environ.get("PK","0.3"))
 MAX_RATIO = 100.0
 # Variances change by this factor at most from one iteration of the likelihood to the next.
-MAX_STEP = 4.0
+MAX_STEP = 100.0
 # Iterations of the likelihood for fixed residuals: a level that rises or falls needs a few.
-MAX_ITERATIONS = 30
+
 # A step over a gap in time, so many times the usual interval, is as uncertain as the intervals in it.
 MIN_GAP = 3.0
 # A jump: noise would be so far off once in a million steps. By degrees of freedom, 0 to 6.
@@ -75,6 +77,12 @@ class StepNoise:
             np.stack([compose_covariance(recording, unit, keyframes) for unit in single]),
             np.column_stack([variance[:, :t].mean(axis=1), variance[:, t:].mean(axis=1)]),
         )
+
+    @property
+    def kind(self) -> Ints:
+        """Components of the same kind have the same number, shape (c,)."""
+        single = np.isin(self.names, ["length", "angle"])
+        return np.where(single, 2 + np.arange(len(self.names)), self.is_rotation)
 
     @property
     def is_rotation(self) -> Bools:
@@ -149,9 +157,10 @@ def corrected(
     jumps = np.zeros(steps, dtype=np.bool_)
     for _ in range(3):
         used = counted & ~jumps
-        factors = _most_likely(
-            part[:, used], squares[used], redundancy[used], leverage[used], noise.is_rotation
+        better = _most_likely(
+            part[:, used], squares[used], redundancy[used], levels**2, noise.kind
         )
+        factors = better / levels**2
         variance = np.einsum("c,csi->si", factors, part)
         found = ~jumps & _is_jump(variance, squares, redundancy, leverage)
         if not found.any():
@@ -167,33 +176,26 @@ def corrected(
 
 
 def _most_likely(
-    part: Floats, squares: Floats, redundancy: Floats, leverage: Floats, is_rotation: Bools
+    part: Floats, squares: Floats, redundancy: Floats, variance: Floats, kind: Ints
 ) -> Floats:
-    """Return the factors (c,) of the components' variances, of greatest posterior."""
-    # First one factor for all translations, and one for all rotations: what little is seen of a
-    # component is taken to be as the others of its kind.
-    kinds = np.stack([part[~is_rotation].sum(axis=0), part[is_rotation].sum(axis=0)])
-    pooled = _climb(kinds, squares, redundancy, leverage, np.ones(2), np.ones(2))
-    prior = np.where(is_rotation, pooled[1], pooled[0])
-    return _climb(part, squares, redundancy, leverage, prior, prior)
+    """Return better variances of the components, (c,), from those that were believed.
 
-
-def _climb(
-    part: Floats, squares: Floats, redundancy: Floats, leverage: Floats, start: Floats, prior: Floats
-) -> Floats:
-    factors = start.copy()
-    for _ in range(MAX_ITERATIONS):
-        total = np.einsum("c,csi->si", factors, part) * redundancy + leverage
-        found = np.einsum("csi,si->c", part, squares / total**2)
-        expected = np.einsum("csi,si->c", part, redundancy / total)
-        step = (factors * found + PRIOR_RESIDUALS * prior / factors) / (
-            factors * expected + PRIOR_RESIDUALS
-        )
-        step = np.clip(step, 1.0 / MAX_STEP, MAX_STEP)
-        factors = np.clip(factors * step, 1.0 / MAX_RATIO, MAX_RATIO)
-        if np.abs(np.log(step)).max() < 1e-2:
-            break
-    return factors
+    What little is seen of a component is taken to be as the others of its ``kind``, shape (c,).
+    """
+    found = variance * np.einsum("csi,si->c", part, squares)
+    expected = np.einsum("csi,si->c", part, redundancy)
+    same = kind[:, None] == kind
+    usual = (same @ found + PRIOR_RESIDUALS * variance) / (same @ expected + PRIOR_RESIDUALS)
+    # The prior is a Cauchy distribution of the logarithm: here as the normal one that has the same
+    # slope where we are.
+    off = np.log(variance / usual)
+    weight = 1.0 / (SPREAD_OF_KIND**2 + off**2)
+    low, high = np.full(len(off), -np.log(MAX_RATIO)), np.full(len(off), np.log(MAX_RATIO))
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        rises = 0.5 * (found / variance * np.exp(-middle) - expected) > weight * (off + middle)
+        low, high = np.where(rises, middle, low), np.where(rises, high, middle)
+    return variance * np.exp(middle)
 
 
 def _is_jump(variance: Floats, squares: Floats, redundancy: Floats, leverage: Floats) -> Bools:

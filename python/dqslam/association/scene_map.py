@@ -161,6 +161,8 @@ class SceneMap:
         )
         self.levels, self.inflation = better.levels, better.inflation
         self._believe_noise()
+        import os
+        if os.environ.get("DBG"): print(len(self.poses), "%.3f"%better.change, dict(zip(self.step_noise.names, ["%.2g"%x for x in self.levels])), "jumps", np.flatnonzero(self.inflation>1), self.inflation[self.inflation>1].round(1), "box", "%.3f"%(fit.box_squares/fit.box_redundancy))
         return better.change
 
     def joint_covariance(self, pose: int, object_rows: Ints) -> tuple[Ints, Floats]:
