@@ -10,6 +10,8 @@ import numpy as np
 from dqslam import _core
 from dqslam._checks import Floats, Ints
 from dqslam._ids import ObjectRow
+from dqslam.association.box_levels import corrected_boxes
+from dqslam.association.gating import GATE
 from dqslam.association.labels import Labels
 from dqslam.association.noise import StepNoise, corrected
 from dqslam.assumptions import BoxNoise, OdometryNoise, SizePrior, SizePriors
@@ -35,6 +37,7 @@ class SceneMap:
         labels: Labels,
         *,
         box_noise: BoxNoise,
+        learns_box_noise: bool = False,
         size_prior: SizePrior | SizePriors | None = None,
         first_size: SizePrior = ANY_SIZE,
         step_noise: StepNoise | None = None,
@@ -63,6 +66,9 @@ class SceneMap:
         self.observation_rows: Ints = np.arange(len(detections))
         """What the boxes are called beyond this map, shape (m,)."""
         self.box_noise = box_noise
+        self.learns_box_noise = learns_box_noise
+        self.judging_noise = box_noise
+        """What boxes are judged by: noise that is estimated may be too low where they are few."""
         self.box_covariance = box_noise.covariance(detections.box)
         self.mode = mode
         self.learns_size = size_prior is None
@@ -138,8 +144,9 @@ class SceneMap:
         """
         left_out = self.labels.left_out
         self.labels.left_out = left_out | dict.fromkeys(object_rows, "on trial")
+        noise, self.box_noise = self.box_noise, self.judging_noise
         graph = self.graph()
-        self.labels.left_out = left_out
+        self.labels.left_out, self.box_noise = left_out, noise
         if graph is None:
             return 0.0, self._path_by_odometry()
         solution = _core.solve(graph.core, self._options(max_iterations), self.state(graph))
@@ -151,19 +158,24 @@ class SceneMap:
         return None if self.step_noise is None else self.step_noise.typical(self.levels)
 
     def estimate_noise(self) -> float:
-        """Correct the levels of the odometry's noise; return how far they changed, as a log."""
+        """Correct the levels of the noise; return how far the odometry's changed, as a log."""
         graph = self.graph()
-        if self.step_noise is None or graph is None or self.mode == _core.Mode.MAPPING:
+        learns_steps = self.step_noise is not None and self.mode == _core.Mode.SLAM
+        if graph is None or not (learns_steps or self.learns_box_noise):
             return 0.0
         fit = _core.fit(graph.core, self._options(), self.state(graph))
-        better = corrected(
-            self.step_noise, self.levels, self.inflation, fit, lowest=self.lowest_levels
-        )
-        self.levels, self.inflation = better.levels, better.inflation
-        self._believe_noise()
+        change = 0.0
+        if self.step_noise is not None and learns_steps:
+            better = corrected(
+                self.step_noise, self.levels, self.inflation, fit, lowest=self.lowest_levels
+            )
+            self.levels, self.inflation, change = better.levels, better.inflation, better.change
+            self._believe_noise()
+        if self.learns_box_noise:
+            self._correct_box_noise(graph, fit)
         import os
-        if os.environ.get("DBG"): print(len(self.poses), "%.3f"%better.change, dict(zip(self.step_noise.names, ["%.2g"%x for x in self.levels])), "jumps", np.flatnonzero(self.inflation>1), self.inflation[self.inflation>1].round(1), "box", "%.3f"%(fit.box_squares/fit.box_redundancy))
-        return better.change
+        if os.environ.get("DBG"): print(len(self.poses), "%.3f"%change, dict(zip(self.step_noise.names, ["%.2g"%x for x in self.levels])), "jumps", np.flatnonzero(self.inflation>1), self.inflation[self.inflation>1].round(1), "box", "%.3f"%(fit.box_squares/fit.box_redundancy), self.box_noise)
+        return change
 
     def joint_covariance(self, pose: int, object_rows: Ints) -> tuple[Ints, Floats]:
         """Return which of some objects take part, and their covariance together with a pose's.
@@ -229,6 +241,37 @@ class SceneMap:
         )
 
     # ---- inside
+
+    def _correct_box_noise(self, graph: Graph, fit: _core.Fit) -> None:
+        """Estimate the noise of boxes from those that the image border does not cut."""
+        boxes, state = graph.core.boxes, self.state(graph)
+        pose, objects = state.poses[boxes.pose], state.landmarks[boxes.object]
+        projected, in_front = _core.project_to_boxes(
+            graph.core.pose_model, graph.core.camera, pose, objects
+        )
+        chi2 = _core.box_chi_squares(
+            graph.core.pose_model,
+            graph.core.camera,
+            pose,
+            objects,
+            boxes.box,
+            boxes.covariance,
+            boxes.truncated,
+        )
+        used = in_front & ~boxes.truncated.any(axis=1) & (chi2 <= GATE[4])
+        side = np.tile(boxes.box[:, 2:] - boxes.box[:, :2], (1, 2))
+        self.box_noise = corrected_boxes(
+            self.box_noise,
+            (boxes.box - projected)[used].ravel(),
+            side[used].ravel(),
+            fit.box_redundancy / max(int(np.sum(~boxes.truncated)), 1),
+        )
+        default = BoxNoise()
+        self.judging_noise = BoxNoise(
+            max(self.box_noise.pixels, default.pixels),
+            max(self.box_noise.relative, default.relative),
+        )
+        self.box_covariance = self.judging_noise.covariance(self.recording.detections.box)
 
     def _believe_noise(self) -> None:
         if self.step_noise is None:
