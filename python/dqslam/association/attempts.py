@@ -20,8 +20,11 @@ from dqslam.association.initiation import MIN_VIEWS
 from dqslam.association.refine import refine
 from dqslam.association.scene_map import SceneMap
 
-# A map is tried again unless it explains this share of the boxes that might show an object.
-ENOUGH_EXPLAINED = 2.0 / 3.0
+# Final ids are believed from the start unless a map explains this share of the boxes that might
+# show an object: it is quick, and a map without some of its objects may be wrong ...
+ENOUGH_OF_IDS = 0.95
+# ... and noise is raised unless it explains this share: boxes may show what moves, or nothing.
+ENOUGH_EXPLAINED = 0.5
 # Another attempt is better if it explains so many times as many boxes: fewer are chance.
 BETTER = 1.05
 # Sigmas of the odometry's noise begin so much larger in the last attempt.
@@ -33,11 +36,10 @@ MakeScene = Callable[[float], SceneMap]
 
 @dataclass(frozen=True)
 class Attempt:
-    """A map, and how it was begun."""
+    """A map, and what made it."""
 
     scene: SceneMap
     follower: Follower
-    how: str
 
     @property
     def explained(self) -> int:
@@ -55,19 +57,19 @@ def make_map(
     follower = Follower(trust=trust)
     follower.follow(first, lambda share: progress(0.7 * share))
     refine(first, follower, lambda share: progress(0.7 + 0.2 * share))
-    best = Attempt(first, follower, "")
+    best = Attempt(first, follower)
     remarks = []
     raises = first.step_noise is not None and first.mode == _core.Mode.SLAM
-    for how, raised, grown in (
-        ("with all ids believed from the start", 1.0, True),
-        ("with all ids believed and the noise raised", RAISED, True),
-        ("with the noise of the odometry raised", RAISED, False),
+    for how, enough, raised, grown in (
+        ("with all ids believed from the start", ENOUGH_OF_IDS, 1.0, True),
+        ("with all ids believed and the noise raised", ENOUGH_EXPLAINED, RAISED, True),
+        ("with the noise of the odometry raised", ENOUGH_EXPLAINED, RAISED, False),
     ):
-        if best.explained >= ENOUGH_EXPLAINED * possible:
+        if best.explained >= enough * possible:
             break
         if (raised > 1.0 and not raises) or (grown and not follower.final):
             continue
-        other = _attempt(make_scene(raised), trust, how, grown=grown)
+        other = _attempt(make_scene(raised), trust, grown=grown)
         if other is None:
             continue
         is_better = other.explained > BETTER * best.explained
@@ -79,14 +81,14 @@ def make_map(
     return best, remarks
 
 
-def _attempt(scene: SceneMap, trust: float, how: str, *, grown: bool) -> Attempt | None:
+def _attempt(scene: SceneMap, trust: float, *, grown: bool) -> Attempt | None:
     follower = Follower(trust=trust)
     if not grown:
         follower.follow(scene, lambda share: None)
     elif not grow_together(scene):
         return None
     refine(scene, follower)
-    return Attempt(scene, follower, how)
+    return Attempt(scene, follower)
 
 
 def long_tracklets(scene: SceneMap) -> Ints:

@@ -1,11 +1,11 @@
 """How good the odometry is, estimated from how well it agrees with the boxes.
 
-The covariance of a step is a sum of components: a shape, known from the step, times the square of a
-level that is not. Residuals r of an estimate, whitened by what was believed, and their leverages h
-are those of an independent measurement of the error of each step, r / (1 - h), with variance
-h / (1 - h) beside that of the step. The levels of greatest likelihood have the sum of squares that
-is expected, of all residuals, each with the share of its variance that a component has: variance
-components (Foerstner 1979; restricted maximum likelihood). Then the estimate is made again.
+The covariance of a step is a sum of components: of each a shape is known, and a level is not.
+Variance components: the squared residuals of a group of measurements sum to its redundancy, which
+is their number less what they determine themselves (Foerstner 1979). Each residual counts for a
+component by the share of its variance that the component has. Where the sum of squares is larger
+than the redundancy, the component is larger than believed, and the estimate is made again with its
+level corrected.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from dqslam import _core
 from dqslam._checks import Bools, Floats, Ints
@@ -21,103 +20,120 @@ from dqslam.association.thinning import compose_covariance
 from dqslam.assumptions import OdometryNoise
 from dqslam.recording import Recording
 
-import os
-# A component must outweigh this many residuals that agree with its kind.
-PRIOR_RESIDUALS = float(os.environ.get("PR","1"))
-# Variances change by this factor at most: residuals far from what was believed tell little of it.
-SPREAD_OF_KIND=float(os.environ.get("PK","0.3"))
+# A kind must outweigh this many residuals that agree with the level believed: few change little.
+PRIOR_RESIDUALS = 1.0
+# Logarithms of the variances of axes differ by this, or by much: odometry on the plane has no noise
+# out of it. Hence a Cauchy distribution of this scale.
+SPREAD_OF_AXES = 0.3
+# A correction changes variances by this factor at most.
 MAX_RATIO = 100.0
-# Variances change by this factor at most from one iteration of the likelihood to the next.
-MAX_STEP = 100.0
-# Iterations of the likelihood for fixed residuals: a level that rises or falls needs a few.
-
-# A step over a gap in time, so many times the usual interval, is as uncertain as the intervals in it.
+# A step that takes so many times the usual interval is over a gap, and as uncertain as all of them.
 MIN_GAP = 3.0
-# A jump: noise would be so far off once in a million steps. By degrees of freedom, 0 to 6.
+# A step is a jump if noise would be as far off once in a million steps. By residuals, 0 to 6.
 JUMP_CHI2 = np.array([np.inf, 23.93, 27.63, 30.66, 33.38, 35.89, 38.26])
+# Boxes say something of a residual of the odometry if its redundancy is above this.
+MIN_REDUNDANCY = 0.05
+# Times that jumps are looked for: without the largest, the level is lower, and others stand out.
+JUMP_ROUNDS = 3
+
+OF_MOTION = ("length", "angle")
 
 
 @dataclass(frozen=True)
 class StepNoise:
-    """Covariance of the motion between keyframes, as a sum of unknown levels."""
+    """Covariance of the motion between keyframes, as a sum of c components of unknown levels."""
 
     names: tuple[str, ...]
-    """Of the components, c of them."""
+    """Of the components."""
     units: Floats
     """Covariance of each motion for a level of 1, shape (c, n - 1, k, k)."""
     of_step: Floats
     """Mean variance of a step along an axis and about one, for a level of 1, shape (c, 2)."""
+    finds_jumps: bool = True
+    """Whether a step may have a covariance of its own."""
 
     @classmethod
     def isotropic(cls, per_translation: Floats, per_rotation: Floats) -> StepNoise:
-        """Have one level of translation and one of rotation, (n - 1, k, k), of 1 m and 1 rad."""
+        """Have a level of translation and one of rotation, for sigmas of 1 m and 1 rad a step.
+
+        Shapes (n - 1, k, k).
+        """
         units = np.stack([per_translation, per_rotation])
-        return cls(("translation", "rotation"), units, np.eye(2))
+        return cls(("translation", "rotation"), units, np.eye(2), finds_jumps=False)
 
     @classmethod
     def between(cls, recording: Recording, keyframes: Ints) -> StepNoise:
         """Take the components of single steps, and carry them on to the keyframes.
 
-        A level for each axis, [m] and [rad] a step or, across a gap, a usual interval, and one of
-        the length and of the angle that a step moves, as a share of them.
+        Levels are a sigma for each axis, meters and radians a step, or, across a gap in time, an
+        usual interval; and the share of its length and of its angle by which a step is off.
         """
-        translations, rotation = motions(recording)
+        moved, turned = _motions(recording)
         steps, k, _ = recording.odometry.covariance.shape
         t = translation_axes(k)
-        gap = gaps(recording.timestamps)
-        axes = gap[:, None, None] * np.einsum("ca,cb->cab", np.eye(k), np.eye(k))[:, None]
-        moved = np.zeros((2, steps, k))
-        moved[0, :, :t], moved[1, :, t:] = translations, rotation
-        single = np.concatenate([axes, np.einsum("csa,csb->csab", moved, moved)])
-        names = [f"translation_{axis}" for axis in "xyz"[:t]]
-        names += [f"rotation_{axis}" for axis in "xyz"[3 - (k - t) :]]
+        axes = np.einsum("ca,cb->cab", np.eye(k), np.eye(k))
+        of_motion = np.zeros((2, steps, k))
+        of_motion[0, :, :t], of_motion[1, :, t:] = moved, turned
+        single = np.concatenate(
+            [
+                usual_intervals(recording.timestamps)[:, None, None] * axes[:, None],
+                np.einsum("csa,csb->csab", of_motion, of_motion),
+            ]
+        )
         variance = np.einsum("csaa->ca", single) / max(steps, 1)
         return cls(
-            (*names, "length", "angle"),
+            (
+                *(f"translation_{axis}" for axis in "xyz"[:t]),
+                *(f"rotation_{axis}" for axis in "xyz"[t - k :]),
+                *OF_MOTION,
+            ),
             np.stack([compose_covariance(recording, unit, keyframes) for unit in single]),
             np.column_stack([variance[:, :t].mean(axis=1), variance[:, t:].mean(axis=1)]),
         )
 
     @property
-    def kind(self) -> Ints:
-        """Components of the same kind have the same number, shape (c,)."""
-        single = np.isin(self.names, ["length", "angle"])
-        return np.where(single, 2 + np.arange(len(self.names)), self.is_rotation)
-
-    @property
     def is_rotation(self) -> Bools:
         """Which components are rotations, shape (c,)."""
-        return np.asarray(self.of_step[:, 1] > self.of_step[:, 0])
+        return np.array([name.startswith(("rotation", "angle")) for name in self.names])
 
-    def covariance(self, levels: Floats, inflation: Floats | float = 1.0) -> Floats:
+    @property
+    def kinds(self) -> Ints:
+        """Numbers of kinds, the same for all axes of translation or of rotation, shape (c,)."""
+        return np.where(np.isin(self.names, OF_MOTION), 2, 0) + self.is_rotation
+
+    def covariance(self, levels: Floats, inflation: Floats | None = None) -> Floats:
         """Return the covariances for some levels (c,), shape (n - 1, k, k).
 
-        That of a jump is inflated, shape (n - 1,).
+        Those of jumps are multiplied by their ``inflation``, shape (n - 1,).
         """
-        sum_of_all = np.einsum("c,csab->sab", levels**2, self.units)
-        return np.asarray(np.broadcast_to(inflation, len(sum_of_all))[:, None, None] * sum_of_all)
+        covariance = np.einsum("c,csab->sab", levels**2, self.units)
+        return np.asarray(
+            covariance if inflation is None else inflation[:, None, None] * covariance
+        )
 
     def typical(self, levels: Floats) -> OdometryNoise:
-        """Return the root mean square of a step for some levels (c,)."""
+        """Return the root mean square of a step on an axis, for some levels (c,)."""
         return OdometryNoise(*np.sqrt(levels**2 @ self.of_step).tolist())
 
 
-def motions(recording: Recording) -> tuple[Floats, Floats]:
+def _motions(recording: Recording) -> tuple[Floats, Floats]:
     """Return how each step moves, (s, t), and turns, (s, r), in the frame of its end."""
-    relative = recording.odometry.relative
-    back = _core.inverse(recording.odometry.pose_model, relative)
-    if recording.odometry.pose_model == _core.PoseModel.SE2:
-        return -back[:, :2], relative[:, 2:]
-    return -back[:, :3], Rotation.from_quat(relative[:, 3:]).as_rotvec()
+    from scipy.spatial.transform import Rotation
+
+    odometry = recording.odometry
+    back = _core.inverse(odometry.pose_model, odometry.relative)
+    if odometry.pose_model == _core.PoseModel.SE2:
+        return -back[:, :2], odometry.relative[:, 2:]
+    return -back[:, :3], Rotation.from_quat(odometry.relative[:, 3:]).as_rotvec()
 
 
-def gaps(timestamps: Floats) -> Floats:
-    """Return how many usual intervals each step takes, 1 unless there is a gap, shape (s,)."""
+def usual_intervals(timestamps: Floats) -> Floats:
+    """Return how many median intervals each step takes, 1 unless it is over a gap, shape (s,)."""
     interval = np.diff(timestamps)
-    if not interval.size or np.median(interval) <= 0.0:
-        return np.ones(len(interval))
+    if not interval.size:
+        return np.ones(0)
     ratio = interval / np.median(interval)
-    return np.where(ratio > MIN_GAP, ratio, 1.0)
+    return np.where(ratio >= MIN_GAP, ratio, 1.0)
 
 
 def translation_axes(k: int) -> int:
@@ -127,12 +143,14 @@ def translation_axes(k: int) -> int:
 
 @dataclass(frozen=True)
 class Correction:
-    """Better levels of the noise, and how far that is from what was believed."""
+    """Better levels of the noise, and how far they are from those that were believed."""
 
     levels: Floats
+    """Shape (c,)."""
     inflation: Floats
+    """Factor of the covariance of each motion, 1 unless it is a jump, shape (n - 1,)."""
     change: float
-    """Mean logarithm of the factor of sigma, over all that residuals say something of."""
+    """Mean logarithm of the factor of sigmas, over all that the boxes say something of."""
 
 
 def corrected(
@@ -140,76 +158,93 @@ def corrected(
 ) -> Correction:
     """Return better levels from the residuals of an estimate that believed some.
 
-    It had the motions up to its last pose, the first of them. No level becomes lower than its
-    ``lowest``, shape (c,).
+    It may end before the last keyframe. No level falls below its ``lowest``, shape (c,).
     """
     steps = len(fit.odometry_residuals)
-    believed = noise.covariance(levels, inflation)[:steps]
-    whitener = np.linalg.inv(np.linalg.cholesky(believed))
-    part = np.einsum("sia,csab,sib->csi", whitener, noise.units[:, :steps], whitener)
-    part *= (levels**2)[:, None, None]  # of the variance of each residual, if nothing changes
-    squares = fit.odometry_residuals**2
-    leverage = np.clip(fit.odometry_leverage, 0.0, 1.0)
-    redundancy = 1.0 - leverage
-    counted = redundancy.sum(axis=1) > 0.0
+    # Rows of the whitener are directions: the variance that a component has in each, as a share.
+    whitener = np.linalg.inv(np.linalg.cholesky(noise.covariance(levels, inflation)[:steps]))
+    units = noise.units[:, :steps]
+    share = np.einsum("c,sia,csab,sib->csi", levels**2, whitener, units, whitener, optimize=True)
+    squares = np.asarray(fit.odometry_residuals**2)
+    redundancy = 1.0 - np.clip(fit.odometry_leverage, 0.0, 1.0)
 
     factors = np.ones(len(levels))
-    jumps = np.zeros(steps, dtype=np.bool_)
-    for _ in range(3):
-        used = counted & ~jumps
-        better = _most_likely(
-            part[:, used], squares[used], redundancy[used], levels**2, noise.kind
-        )
-        factors = better / levels**2
-        variance = np.einsum("c,csi->si", factors, part)
-        found = ~jumps & _is_jump(variance, squares, redundancy, leverage)
-        if not found.any():
+    is_jump = np.zeros(steps, dtype=np.bool_)
+    for _ in range(JUMP_ROUNDS):
+        found = np.einsum("csi,si->c", share[:, ~is_jump], squares[~is_jump])
+        expected = np.einsum("csi,si->c", share[:, ~is_jump], redundancy[~is_jump])
+        factors = better_variances(levels**2, found, expected, noise.kinds) / levels**2
+        if not noise.finds_jumps:
             break
-        jumps |= found
+        variance = np.einsum("c,csi->si", factors, share)
+        impossible = is_impossible(variance, squares, redundancy)
+        if not (impossible & ~is_jump).any():
+            break
+        is_jump |= impossible
+
     now = inflation.copy()
     now[:steps] = 1.0
-    for step in np.flatnonzero(jumps):
-        now[step] = _inflate(variance[step], squares[step], redundancy[step], leverage[step])
-    ratio = np.einsum("c,csi->si", factors, part) * now[:steps, None]
-    change = np.sum(redundancy * np.abs(np.log(ratio))) / (2.0 * max(redundancy.sum(), 1e-9))
-    return Correction(np.maximum(levels * np.sqrt(factors), lowest), now, float(change))
+    variance = np.einsum("c,csi->si", factors, share)
+    for step in np.flatnonzero(is_jump).tolist():
+        now[step] = jump_inflation(variance[step], squares[step], redundancy[step])
+    change = np.abs(np.log(variance * now[:steps, None])) / 2.0
+    known = max(float(redundancy.sum()), 1e-12)
+    return Correction(
+        np.maximum(levels * np.sqrt(factors), lowest),
+        now,
+        float(np.sum(redundancy * change)) / known,
+    )
 
 
-def _most_likely(
-    part: Floats, squares: Floats, redundancy: Floats, variance: Floats, kind: Ints
-) -> Floats:
-    """Return better variances of the components, (c,), from those that were believed.
+def better_variances(variance: Floats, found: Floats, expected: Floats, kinds: Ints) -> Floats:
+    """Return better variances of the components, (c,), than those that were believed.
 
-    What little is seen of a component is taken to be as the others of its ``kind``, shape (c,).
+    Parameters
+    ----------
+    variance
+        What was believed, shape (c,).
+    found, expected
+        Sums of squared residuals and of redundancies, by the share of each component, (c,).
+    kinds
+        What little is seen of a component is taken to be as the others of its kind, shape (c,).
     """
-    found = variance * np.einsum("csi,si->c", part, squares)
-    expected = np.einsum("csi,si->c", part, redundancy)
-    same = kind[:, None] == kind
-    usual = (same @ found + PRIOR_RESIDUALS * variance) / (same @ expected + PRIOR_RESIDUALS)
-    # The prior is a Cauchy distribution of the logarithm: here as the normal one that has the same
-    # slope where we are.
+    same = (kinds[:, None] == kinds).astype(float)
+    usual = (same @ (variance * found) + PRIOR_RESIDUALS * variance) / (
+        same @ expected + PRIOR_RESIDUALS
+    )
+    # Of the distribution of logarithms, the normal one with the same slope where we are.
     off = np.log(variance / usual)
-    weight = 1.0 / (SPREAD_OF_KIND**2 + off**2)
-    low, high = np.full(len(off), -np.log(MAX_RATIO)), np.full(len(off), np.log(MAX_RATIO))
-    for _ in range(40):
+    weight = 1.0 / (SPREAD_OF_AXES**2 + off**2)
+    low = np.full(len(off), -np.log(MAX_RATIO))
+    high = -low
+    while np.any(high - low > 1e-6):  # the slope of the posterior falls: bisection finds its zero
         middle = 0.5 * (low + high)
-        rises = 0.5 * (found / variance * np.exp(-middle) - expected) > weight * (off + middle)
-        low, high = np.where(rises, middle, low), np.where(rises, high, middle)
-    return variance * np.exp(middle)
+        slope = 0.5 * (found * np.exp(-middle) - expected) - weight * (off + middle)
+        low, high = np.where(slope > 0.0, middle, low), np.where(slope > 0.0, high, middle)
+    alone = same.sum(axis=1) == 1.0
+    return np.asarray(np.where(alone, usual, variance * np.exp(0.5 * (low + high))))
 
 
-def _is_jump(variance: Floats, squares: Floats, redundancy: Floats, leverage: Floats) -> Bools:
-    shown = redundancy > 0.05
-    chi2 = squares / np.maximum(redundancy * (variance * redundancy + leverage), 1e-300)
-    return np.asarray(np.sum(np.where(shown, chi2, 0.0), axis=1) > JUMP_CHI2[shown.sum(axis=1)])
+def is_impossible(variance: Floats, squares: Floats, redundancy: Floats) -> Bools:
+    """Return which steps noise does not explain, shape (s,).
+
+    Of whitened residuals: their variances in units of what was believed, their squares, and their
+    redundancies, shape (s, k). A residual over its redundancy is an error of the step as boxes
+    measure it, with the variance of the step and, beside it, leverage over redundancy.
+    """
+    known = redundancy > MIN_REDUNDANCY
+    spread = redundancy * (variance * redundancy + 1.0 - redundancy)
+    chi2 = np.where(known, squares / np.where(known, spread, 1.0), 0.0).sum(axis=1)
+    return np.asarray(chi2 > JUMP_CHI2[known.sum(axis=1)])
 
 
-def _inflate(variance: Floats, squares: Floats, redundancy: Floats, leverage: Floats) -> float:
-    """Return the factor of a step's variance for which its residuals are what is expected."""
+def jump_inflation(variance: Floats, squares: Floats, redundancy: Floats) -> float:
+    """Return the factor of a step's variances, shape (k,), for which its residuals are usual."""
+    known = redundancy > MIN_REDUNDANCY
+    variance, squares, redundancy = variance[known], squares[known], redundancy[known]
     factor = 1.0
-    shown = redundancy > 0.05
-    v, s, q, h = (a[shown] for a in (variance, squares, redundancy, leverage))
-    for _ in range(100):
-        total = factor * v * q + h
-        factor *= float(np.sum(v * s / total**2) / np.sum(v * q / total))
+    for _ in range(50):
+        total = factor * variance * redundancy + 1.0 - redundancy
+        found = np.sum(variance * squares / total**2)
+        factor *= float(found / np.sum(variance * redundancy / total))
     return max(factor, 1.0)

@@ -173,8 +173,6 @@ class SceneMap:
             self._believe_noise()
         if self.learns_box_noise:
             self._correct_box_noise(graph, fit)
-        import os
-        if os.environ.get("DBG"): print(len(self.poses), "%.3f"%change, dict(zip(self.step_noise.names, ["%.2g"%x for x in self.levels])), "jumps", np.flatnonzero(self.inflation>1), self.inflation[self.inflation>1].round(1), "box", "%.3f"%(fit.box_squares/fit.box_redundancy), self.box_noise)
         return change
 
     def joint_covariance(self, pose: int, object_rows: Ints) -> tuple[Ints, Floats]:
