@@ -147,7 +147,8 @@ def associate(
     keyframes = choose_keyframes(recording, tracklets)
     used = np.isin(recording.detections.pose, keyframes)
     thin = thin_recording(recording, keyframes)
-    noise = StepNoise.between(recording, keyframes) if estimates_noise else None
+    learns_steps = estimates_noise and mode == _core.Mode.SLAM
+    noise = StepNoise.between(recording, keyframes) if learns_steps else None
     seen = look(thin, tracklets[used], keyframes)
     levels = None if noise is None else first_levels(noise, seen)
 

@@ -25,7 +25,8 @@ from dqslam.association.scene_map import SceneMap
 ENOUGH_OF_IDS = 0.95
 # ... and noise is raised unless it explains this share: boxes may show what moves, or nothing.
 ENOUGH_EXPLAINED = 0.5
-# Another attempt is better if it explains so many times as many boxes: fewer are chance.
+# Another attempt is better if it explains so many times as many boxes, and enough: fewer are
+# chance, for noise that is large bends the path to any boxes.
 BETTER = 1.05
 # Sigmas of the odometry's noise begin so much larger in the last attempt.
 RAISED = 3.0
@@ -59,7 +60,7 @@ def make_map(
     refine(first, follower, lambda share: progress(0.7 + 0.2 * share))
     best = Attempt(first, follower)
     remarks = []
-    raises = first.step_noise is not None and first.mode == _core.Mode.SLAM
+    raises = first.step_noise is not None
     for how, enough, raised, grown in (
         ("with all ids believed from the start", ENOUGH_OF_IDS, 1.0, True),
         ("with all ids believed and the noise raised", ENOUGH_EXPLAINED, RAISED, True),
@@ -72,7 +73,9 @@ def make_map(
         other = _attempt(make_scene(raised), trust, grown=grown)
         if other is None:
             continue
-        is_better = other.explained > BETTER * best.explained
+        is_better = other.explained > max(
+            BETTER * best.explained, ENOUGH_EXPLAINED * possible
+        )
         remarks.append(
             f"the map explained {best.explained} of {possible} boxes; made again {how} it "
             f"explains {other.explained}" + (", and is used" if is_better else ", and is not used")

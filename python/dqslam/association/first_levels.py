@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dqslam._checks import Floats, Ints
-from dqslam.association.noise import StepNoise
+from dqslam.association.noise import OF_MOTION, StepNoise
 from dqslam.association.rays import cameras_by_odometry, cast_rays
 from dqslam.assumptions import OdometryNoise
 from dqslam.recording import Recording
@@ -23,8 +23,11 @@ MIN_PARALLAX = 0.02
 MIN_TRIPLES = 10
 # Residuals below the level, which is to be high: the 95 % of a normal distribution.
 HIGH_QUANTILE, HIGH_SIGMAS = 0.95, 1.96
-# Share of the length and of the angle of a step that its noise may be, before more is known.
-FIRST_SHARE = 0.2
+# Rays that miss each other by more a step show nothing that is at rest [rad].
+MAX_ANGLE = 0.2
+# Share of the length and of the angle of a step that its noise may be, before more is known. Where
+# no rays show that anything is at rest, a large one would explain any boxes.
+FIRST_SHARE, FIRST_SHARE_UNSEEN = 0.2, 0.005
 
 
 @dataclass(frozen=True)
@@ -40,7 +43,7 @@ class FirstLook:
 
 
 def look(recording: Recording, tracklets: Ints, steps: Ints) -> FirstLook | None:
-    """Compare the rays of tracklets (m,); None if too few have parallax.
+    """Compare the rays of tracklets (m,); None if they tell nothing: too few have parallax, or do not meet.
 
     ``steps`` counts those before each pose, shape (n,).
     """
@@ -68,9 +71,12 @@ def look(recording: Recording, tracklets: Ints, steps: Ints) -> FirstLook | None
     # Residuals (1, -2, 1) / 6 of a second difference: that of two steps.
     between = steps[pose[triple[:, 2]]] - steps[pose[triple[:, 0]]]
     sigma = np.sqrt(6.0 * np.sum(sine**2, axis=1) / between)[ahead]
+    angle = float(np.quantile(sigma, HIGH_QUANTILE)) / HIGH_SIGMAS
+    if angle > MAX_ANGLE:
+        return None
     middle = np.median(distance[ahead], axis=1)
     return FirstLook(
-        float(np.quantile(sigma, HIGH_QUANTILE)) / HIGH_SIGMAS,
+        angle,
         float(np.median(middle)),
         float(np.median(np.log(middle * rays.half_width[triple[ahead, 1]]))),
     )
@@ -85,4 +91,5 @@ def first_levels(noise: StepNoise, seen: FirstLook | None) -> Floats:
         else (seen.angle * seen.distance, seen.angle)
     )
     levels = np.where(noise.is_rotation, sigma[1], sigma[0])
-    return np.where(np.isin(noise.names, ["length", "angle"]), FIRST_SHARE, levels)
+    share = FIRST_SHARE_UNSEEN if seen is None else FIRST_SHARE
+    return np.where(np.isin(noise.names, OF_MOTION), share, levels)

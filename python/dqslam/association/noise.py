@@ -124,7 +124,7 @@ def _motions(recording: Recording) -> tuple[Floats, Floats]:
     back = _core.inverse(odometry.pose_model, odometry.relative)
     if odometry.pose_model == _core.PoseModel.SE2:
         return -back[:, :2], odometry.relative[:, 2:]
-    return -back[:, :3], Rotation.from_quat(odometry.relative[:, 3:]).as_rotvec()
+    return -back[:, :3], Rotation.from_quat(odometry.relative[:, 3:].copy()).as_rotvec()
 
 
 def usual_intervals(timestamps: Floats) -> Floats:

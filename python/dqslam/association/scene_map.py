@@ -160,12 +160,11 @@ class SceneMap:
     def estimate_noise(self) -> float:
         """Correct the levels of the noise; return how far the odometry's changed, as a log."""
         graph = self.graph()
-        learns_steps = self.step_noise is not None and self.mode == _core.Mode.SLAM
-        if graph is None or not (learns_steps or self.learns_box_noise):
+        if graph is None or (self.step_noise is None and not self.learns_box_noise):
             return 0.0
         fit = _core.fit(graph.core, self._options(), self.state(graph))
         change = 0.0
-        if self.step_noise is not None and learns_steps:
+        if self.step_noise is not None:
             better = corrected(
                 self.step_noise, self.levels, self.inflation, fit, lowest=self.lowest_levels
             )
