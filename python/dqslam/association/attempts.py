@@ -73,9 +73,7 @@ def make_map(
         other = _attempt(make_scene(raised), trust, grown=grown)
         if other is None:
             continue
-        is_better = other.explained > max(
-            BETTER * best.explained, ENOUGH_EXPLAINED * possible
-        )
+        is_better = other.explained > max(BETTER * best.explained, ENOUGH_EXPLAINED * possible)
         remarks.append(
             f"the map explained {best.explained} of {possible} boxes; made again {how} it "
             f"explains {other.explained}" + (", and is used" if is_better else ", and is not used")

@@ -43,9 +43,9 @@ class FirstLook:
 
 
 def look(recording: Recording, tracklets: Ints, steps: Ints) -> FirstLook | None:
-    """Compare the rays of tracklets (m,); None if they tell nothing: too few have parallax, or do not meet.
+    """Compare the rays of tracklets (m,); ``steps`` counts those before each pose, shape (n,).
 
-    ``steps`` counts those before each pose, shape (n,).
+    None if they tell nothing: too few have parallax, or they do not meet.
     """
     rays = cast_rays(recording, cameras_by_odometry(recording))
     pose = recording.detections.pose

@@ -36,6 +36,9 @@ MIN_REDUNDANCY = 0.05
 # Times that jumps are looked for: without the largest, the level is lower, and others stand out.
 JUMP_ROUNDS = 3
 
+# The motion of a step is the median of so many, it in the middle.
+MEDIAN_STEPS = 5
+
 OF_MOTION = ("length", "angle")
 
 
@@ -117,14 +120,26 @@ class StepNoise:
 
 
 def _motions(recording: Recording) -> tuple[Floats, Floats]:
-    """Return how each step moves, (s, t), and turns, (s, r), in the frame of its end."""
+    """Return how each step moves, (s, t), and turns, (s, r), in the frame of its end.
+
+    The median of the steps around it: the noise of a step, which is in what it measured, is no
+    motion, and would explain itself as a share of it.
+    """
+    from scipy.ndimage import median_filter
     from scipy.spatial.transform import Rotation
 
     odometry = recording.odometry
-    back = _core.inverse(odometry.pose_model, odometry.relative)
+    moved = -_core.inverse(odometry.pose_model, odometry.relative)[:, :3]
     if odometry.pose_model == _core.PoseModel.SE2:
-        return -back[:, :2], odometry.relative[:, 2:]
-    return -back[:, :3], Rotation.from_quat(odometry.relative[:, 3:].copy()).as_rotvec()
+        moved, turned = moved[:, :2], odometry.relative[:, 2:]
+    else:
+        turned = Rotation.from_quat(odometry.relative[:, 3:].copy()).as_rotvec()
+    if not len(moved):
+        return moved, turned
+    around = (MEDIAN_STEPS, 1)
+    return median_filter(moved, around, mode="nearest"), median_filter(
+        turned, around, mode="nearest"
+    )
 
 
 def usual_intervals(timestamps: Floats) -> Floats:

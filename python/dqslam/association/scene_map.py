@@ -157,6 +157,12 @@ class SceneMap:
         """Root mean square of the noise of a step, where that is estimated."""
         return None if self.step_noise is None else self.step_noise.typical(self.levels)
 
+    @property
+    def noise_levels(self) -> dict[str, float]:
+        """Levels of the components of that noise, by their names."""
+        names = () if self.step_noise is None else self.step_noise.names
+        return dict(zip(names, self.levels.tolist(), strict=True))
+
     def estimate_noise(self) -> float:
         """Correct the levels of the noise; return how far the odometry's changed, as a log."""
         graph = self.graph()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -48,7 +48,9 @@ class EstimatorOutput:
     box_noise: BoxNoise
     """What was believed in the end."""
     odometry_noise: OdometryNoise | None
-    """Of a step, where it was estimated."""
+    """Root mean square of a step, where it was estimated."""
+    noise_levels: dict[str, float] = field(default_factory=dict)
+    """Of its components: meters and radians a step, and shares of length and angle."""
     remarks: tuple[str, ...] = ()
     """What was noticed on the way, a sentence each."""
     live_poses: Floats | None = None
@@ -117,7 +119,7 @@ def conclude(
         "box_noise": asdict(output.box_noise),
         "odometry_noise": {"from": "given"}
         if noise is None
-        else {"from": "estimated"} | asdict(noise),
+        else {"from": "estimated"} | asdict(noise) | {"levels": output.noise_levels},
         "under_constrained": [str(part) for part in output.marginals.under_constrained]
         if output.marginals
         else [],
