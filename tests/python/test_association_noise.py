@@ -122,7 +122,7 @@ def test_drawn_residuals_give_back_their_levels():
     """
     random = np.random.default_rng(5)
     recording = straight(400)
-    turn = np.where(np.arange(400) % 8 < 2, 0.4, 0.0)
+    turn = np.where(np.arange(400) % 16 < 4, 0.4, 0.0)
     relative = np.column_stack([np.full(400, 0.5), np.zeros(400), turn])
     odometry = Odometry(PoseModel.SE2, np.zeros(3), relative, recording.odometry.covariance)
     recording = Recording(CAMERA, np.arange(401.0), odometry, recording.detections)
