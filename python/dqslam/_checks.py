@@ -85,6 +85,11 @@ def as_covariances(name: str, values: ArrayLike, count: int, size: int) -> Float
     _check_shape(name, array, [count, size, size])
     asymmetric = np.abs(array - array.transpose(0, 2, 1)) > 1e-9 * np.abs(array).max(initial=1e-300)
     reject_rows(name, asymmetric, "covariance is not symmetric")
-    smallest = np.linalg.eigvalsh(array)[:, :1] if count else np.zeros((0, 1))
+    variance = np.diagonal(array, axis1=1, axis2=2)
+    reject_rows(name, variance <= 0.0, "covariance is not positive definite")
+    # Of correlations, so that units do not matter.
+    scale = 1.0 / np.sqrt(variance)
+    correlation = scale[:, :, None] * array * scale[:, None, :]
+    smallest = np.linalg.eigvalsh(correlation)[:, :1] if count else np.zeros((0, 1))
     reject_rows(name, smallest <= 0.0, "covariance is not positive definite")
     return array

@@ -168,7 +168,7 @@ def cut_by_the_border():
     return Recording(CAMERA, np.zeros(1), odometry, detections), np.array(ellipsoids)
 
 
-def map_truly(made, labels=None, *, step_noise=None):
+def map_truly(made, labels=None, *, step_noise=None, levels=None):
     """Return a map of a whole film: each thing with its boxes, or those of other labels (m,).
 
     Poses are the odometry's, objects are where their things are when they are first seen.
@@ -181,6 +181,7 @@ def map_truly(made, labels=None, *, step_noise=None):
         Labels.of(recording.detections, tracklets),
         box_noise=BoxNoise(1.0, 0.0),
         step_noise=step_noise,
+        levels=levels,
     )
     scene.extend(len(made.poses))
     for label in np.unique(labels[labels >= 0]):

@@ -191,7 +191,7 @@ def test_mapping_takes_the_odometry_for_the_truth():
     result = score(made, found)
     assert (result.found, result.invented, result.split) == (8, 0, 0)
     assert result.purity >= 0.98
-    assert found.scene.odometry_noise == OdometryNoise()  # nothing says anything about it
+    assert found.scene.odometry_noise is None  # nothing says anything about it
 
 
 def test_progress_rises_to_one():

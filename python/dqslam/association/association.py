@@ -10,13 +10,14 @@ import numpy as np
 from dqslam import _core
 from dqslam._checks import Bools, Ints, reject_rows, require
 from dqslam._repr import counted
-from dqslam.association.follow import Follower
+from dqslam.association.attempts import make_map
+from dqslam.association.first_levels import first_levels, look
 from dqslam.association.initiation import MIN_VIEWS
 from dqslam.association.keyframes import choose_keyframes
 from dqslam.association.labels import Labels
 from dqslam.association.noise import StepNoise
-from dqslam.association.refine import reassign, refine
-from dqslam.association.scene_map import SceneMap
+from dqslam.association.refine import reassign
+from dqslam.association.scene_map import ANY_SIZE, SceneMap
 from dqslam.association.thinning import fill_in, thin_recording
 from dqslam.association.tracklets import link_tracklets
 from dqslam.assumptions import BoxNoise, SizePrior, SizePriors
@@ -42,6 +43,8 @@ class Association:
     """Ids of the objects, -1 for one that was given up, shape (o,)."""
     left_out: dict[int, str]
     """Ids of objects that do not fit a world at rest, and why. Their boxes keep the ids."""
+    remarks: tuple[str, ...] = ()
+    """Sentences on attempts that were made, and on steps that are no noise."""
 
     def __repr__(self) -> str:
         """Show how many objects there are, and how many of the boxes show one."""
@@ -144,31 +147,43 @@ def associate(
     keyframes = choose_keyframes(recording, tracklets)
     used = np.isin(recording.detections.pose, keyframes)
     thin = thin_recording(recording, keyframes)
-    labels = Labels.of(thin.detections, tracklets[used])
-    labels.make_room(tracklets=int(tracklets.max(initial=-1)) + 1)
-    scene = SceneMap(
-        thin,
-        labels,
-        box_noise=box_noise or BoxNoise(),
-        size_prior=size_prior,
-        step_noise=StepNoise.between(recording, keyframes) if estimates_noise else None,
-        mode=mode,
-    )
-    follower = Follower(trust=trust)
-    follower.follow(scene, lambda share: progress(0.7 * share))
-    refine(scene, follower, lambda share: progress(0.7 + 0.2 * share))
+    learns_steps = estimates_noise and mode == _core.Mode.SLAM
+    noise = StepNoise.between(recording, keyframes) if learns_steps else None
+    seen = look(thin, tracklets[used], keyframes)
+    levels = None if noise is None else first_levels(noise, seen)
+
+    def make_scene(raised: float) -> SceneMap:
+        labels = Labels.of(thin.detections, tracklets[used])
+        labels.make_room(tracklets=int(tracklets.max(initial=-1)) + 1)
+        return SceneMap(
+            thin,
+            labels,
+            box_noise=box_noise or BoxNoise(),
+            learns_box_noise=estimates_noise and box_noise is None,
+            size_prior=size_prior,
+            first_size=ANY_SIZE if seen is None else replace(ANY_SIZE, log_mean=seen.log_size),
+            step_noise=noise,
+            levels=None if levels is None else raised * levels,
+            mode=mode,
+        )
+
+    attempt, remarks = make_map(make_scene, trust, progress)
+    scene, labels = attempt.scene, attempt.scene.labels
     if trust == FINAL:
         object_id, ids = tracker_ids.copy(), _ids_of(labels, tracker_ids[used])
     else:
         everything = _with_all_images(scene, recording, keyframes, tracklets, used)
-        reassign(everything, follower.switch_cost)
+        reassign(everything, attempt.follower.switch_cost)
         object_id, ids = _numbered(everything.labels.object_rows, len(scene.ellipsoids))
     progress(1.0)
     named = {int(ids[row]): why for row, why in labels.left_out.items()}
     left_out = {name: why for name, why in named.items() if name >= 0}
     if trust == FINAL:
         left_out |= not_found(recording, ids, used)
-    return Association(object_id, keyframes, scene, ids, dict(sorted(left_out.items())))
+    remarks += describe_jumps(scene)
+    return Association(
+        object_id, keyframes, scene, ids, dict(sorted(left_out.items())), tuple(remarks)
+    )
 
 
 def _ids_of(labels: Labels, tracker_ids: Ints) -> Ints:
@@ -176,6 +191,16 @@ def _ids_of(labels: Labels, tracker_ids: Ints) -> Ints:
     ids = np.full(len(labels.votes) + 1, -1)
     ids[labels.object_rows] = tracker_ids
     return ids[:-1]
+
+
+def describe_jumps(scene: SceneMap) -> list[str]:
+    """Say which steps of the odometry are jumps."""
+    times = scene.recording.timestamps
+    return [
+        f"the odometry jumps before {times[step + 1]:.6g} s: its noise is believed to be "
+        f"{np.sqrt(scene.inflation[step]):.3g} times that of other steps"
+        for step in np.flatnonzero(scene.inflation > 1.0).tolist()
+    ]
 
 
 def not_found(recording: Recording, ids: Ints, used: Bools) -> dict[int, str]:
@@ -200,7 +225,9 @@ def _with_all_images(
     labels = Labels.of(recording.detections, cut)
     labels.votes = scene.labels.votes.copy()
     labels.object_of_tracklet = scene.labels.object_of_tracklet.copy()
-    everything = SceneMap(recording, labels, box_noise=scene.box_noise, size_prior=scene.size_prior)
+    everything = SceneMap(
+        recording, labels, box_noise=scene.judging_noise, size_prior=scene.size_prior
+    )
     everything.poses = fill_in(recording, keyframes, scene.poses)
     everything.ellipsoids = scene.ellipsoids
     return everything

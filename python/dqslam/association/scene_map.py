@@ -10,6 +10,8 @@ import numpy as np
 from dqslam import _core
 from dqslam._checks import Floats, Ints
 from dqslam._ids import ObjectRow
+from dqslam.association.box_levels import corrected_boxes
+from dqslam.association.gating import GATE
 from dqslam.association.labels import Labels
 from dqslam.association.noise import StepNoise, corrected
 from dqslam.assumptions import BoxNoise, OdometryNoise, SizePrior, SizePriors
@@ -22,6 +24,8 @@ ANY_SIZE = SizePrior(log_mean=float(np.log(0.3)), log_sigma=1.5)
 LEARNED_LOG_SIZE_SIGMA = 0.7
 # The size of objects is learned from so many of them at least: the median of two is no size.
 MIN_OBJECTS_TO_LEARN_SIZE = 3
+# A level falls to this share of the first at most: less is no noise that boxes could show.
+LOWEST_SHARE = 1e-3
 
 
 class SceneMap:
@@ -33,9 +37,11 @@ class SceneMap:
         labels: Labels,
         *,
         box_noise: BoxNoise,
+        learns_box_noise: bool = False,
         size_prior: SizePrior | SizePriors | None = None,
+        first_size: SizePrior = ANY_SIZE,
         step_noise: StepNoise | None = None,
-        odometry_noise: OdometryNoise | None = None,
+        levels: Floats | None = None,
         mode: _core.Mode = _core.Mode.SLAM,
     ) -> None:
         """Start at the first pose, without objects.
@@ -45,10 +51,10 @@ class SceneMap:
         labels
             Of the boxes of the recording; the map changes them.
         size_prior
-            By default it is learned from the objects found.
+            By default it is learned from the objects found, from ``first_size`` on.
         step_noise
-            By default the covariance of the recording's odometry is believed; else its level is
-            estimated, from ``odometry_noise`` on.
+            By default the covariance of the recording's odometry is believed; else the levels of
+            its components are estimated, from ``levels`` on, shape (c,).
         mode
             MAPPING takes the odometry for the truth.
         """
@@ -60,12 +66,18 @@ class SceneMap:
         self.observation_rows: Ints = np.arange(len(detections))
         """What the boxes are called beyond this map, shape (m,)."""
         self.box_noise = box_noise
+        self.learns_box_noise = learns_box_noise
+        self.judging_noise = box_noise
+        """What boxes are judged by: noise that is estimated may be too low where they are few."""
         self.box_covariance = box_noise.covariance(detections.box)
         self.mode = mode
         self.learns_size = size_prior is None
-        self.size_prior = ANY_SIZE if size_prior is None else size_prior
+        self.size_prior = first_size if size_prior is None else size_prior
         self.step_noise = step_noise
-        self.odometry_noise = odometry_noise or OdometryNoise()
+        self.levels = np.zeros(0) if levels is None else levels
+        self.lowest_levels = LOWEST_SHARE * self.levels
+        self.inflation = np.ones(len(recording.odometry.relative))
+        """Factors of the covariances of jumps, shape (n - 1,)."""
         self._believe_noise()
         self.poses: Floats = recording.odometry.first_pose[None]
         self.ellipsoids = np.zeros((0, 9))
@@ -132,24 +144,41 @@ class SceneMap:
         """
         left_out = self.labels.left_out
         self.labels.left_out = left_out | dict.fromkeys(object_rows, "on trial")
+        noise, self.box_noise = self.box_noise, self.judging_noise
         graph = self.graph()
-        self.labels.left_out = left_out
+        self.labels.left_out, self.box_noise = left_out, noise
         if graph is None:
             return 0.0, self._path_by_odometry()
         solution = _core.solve(graph.core, self._options(max_iterations), self.state(graph))
         return solution.summary.final_cost, solution.poses
 
+    @property
+    def odometry_noise(self) -> OdometryNoise | None:
+        """Root mean square of the noise of a step, where that is estimated."""
+        return None if self.step_noise is None else self.step_noise.typical(self.levels)
+
+    @property
+    def noise_levels(self) -> dict[str, float]:
+        """Levels of the components of that noise, by their names."""
+        names = () if self.step_noise is None else self.step_noise.names
+        return dict(zip(names, self.levels.tolist(), strict=True))
+
     def estimate_noise(self) -> float:
-        """Correct the level of the odometry's noise; return the factor it changed by, as a log."""
+        """Correct the levels of the noise; return how far the odometry's changed, as a log."""
         graph = self.graph()
-        if self.step_noise is None or graph is None or self.mode == _core.Mode.MAPPING:
+        if graph is None or (self.step_noise is None and not self.learns_box_noise):
             return 0.0
         fit = _core.fit(graph.core, self._options(), self.state(graph))
-        before, self.odometry_noise = self.odometry_noise, corrected(self.odometry_noise, fit)
-        self._believe_noise()
-        ratio = np.array([self.odometry_noise.translation_m, self.odometry_noise.rotation_rad])
-        ratio /= [before.translation_m, before.rotation_rad]
-        return float(np.abs(np.log(ratio)).max())
+        change = 0.0
+        if self.step_noise is not None:
+            better = corrected(
+                self.step_noise, self.levels, self.inflation, fit, lowest=self.lowest_levels
+            )
+            self.levels, self.inflation, change = better.levels, better.inflation, better.change
+            self._believe_noise()
+        if self.learns_box_noise:
+            self._correct_box_noise(graph, fit)
+        return change
 
     def joint_covariance(self, pose: int, object_rows: Ints) -> tuple[Ints, Floats]:
         """Return which of some objects take part, and their covariance together with a pose's.
@@ -216,10 +245,41 @@ class SceneMap:
 
     # ---- inside
 
+    def _correct_box_noise(self, graph: Graph, fit: _core.Fit) -> None:
+        """Estimate the noise of boxes from those that the image border does not cut."""
+        boxes, state = graph.core.boxes, self.state(graph)
+        pose, objects = state.poses[boxes.pose], state.landmarks[boxes.object]
+        projected, in_front = _core.project_to_boxes(
+            graph.core.pose_model, graph.core.camera, pose, objects
+        )
+        chi2 = _core.box_chi_squares(
+            graph.core.pose_model,
+            graph.core.camera,
+            pose,
+            objects,
+            boxes.box,
+            boxes.covariance,
+            boxes.truncated,
+        )
+        used = in_front & ~boxes.truncated.any(axis=1) & (chi2 <= GATE[4])
+        side = np.tile(boxes.box[:, 2:] - boxes.box[:, :2], (1, 2))
+        self.box_noise = corrected_boxes(
+            self.box_noise,
+            (boxes.box - projected)[used].ravel(),
+            side[used].ravel(),
+            fit.box_redundancy / max(int(np.sum(~boxes.truncated)), 1),
+        )
+        default = BoxNoise()
+        self.judging_noise = BoxNoise(
+            max(self.box_noise.pixels, default.pixels),
+            max(self.box_noise.relative, default.relative),
+        )
+        self.box_covariance = self.judging_noise.covariance(self.recording.detections.box)
+
     def _believe_noise(self) -> None:
         if self.step_noise is None:
             return
-        covariance = self.step_noise.covariance(self.odometry_noise)
+        covariance = self.step_noise.covariance(self.levels, self.inflation)
         odometry = replace(self.recording.odometry, covariance=covariance)
         self.recording = replace(self.recording, odometry=odometry)
 

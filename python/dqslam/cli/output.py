@@ -58,6 +58,10 @@ class Output:
 
             Console().print(text, style=style, markup=False, highlight=False, soft_wrap=True)
 
+    def warn(self, text: str) -> None:
+        """Print a warning to the error stream, whatever else is printed."""
+        typer.secho(f"warning: {text}", fg="red", err=True)
+
     def document(self, content: dict[str, Any]) -> None:
         """Print the JSON document if JSON is wanted; NaN and infinity become null."""
         if self._as_json:

@@ -21,6 +21,8 @@ def show_report(output: Output, report: dict[str, Any]) -> None:
         lines.append(_solver(report["solver"]))
     for line in lines:
         output.line(line)
+    for warning in report["warnings"]:
+        output.warn(warning)
 
 
 def _dropped(report: dict[str, Any]) -> list[tuple[str, str]]:

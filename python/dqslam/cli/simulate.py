@@ -22,8 +22,8 @@ def simulate(
         typer.Argument(
             metavar="[NAME|FILE]",
             help="paper: a drive on the plane; orbit: hand-held, in space; honest and "
-            "honest_orbit: the same, drawn from the assumptions of the estimator; a world of `dqslam "
-            "worlds`; or a TOML file like theirs.",
+            "honest_orbit: the same, drawn from the assumptions of the estimator; a world of "
+            "`dqslam worlds`; or a TOML file like theirs.",
         ),
     ] = "paper",
     seed: Annotated[int, typer.Option(min=0, help="Seed of the world and of all noise.")] = 0,

@@ -45,7 +45,7 @@ def commit(state: State, local: LocalMap) -> Ints:
     ids = [store.tracker_id_of(row) if named else ANY_ID for row in rows[new].tolist()]
     state.registry.register(ids)
     store.size_prior = scene.size_prior
-    if scene.odometry_noise != store.odometry_noise:
+    if scene.odometry_noise not in (None, store.odometry_noise):
         core.scale_odometry(*_ratio(scene.odometry_noise, store.odometry_noise))
         store.odometry_noise = scene.odometry_noise
     return rows

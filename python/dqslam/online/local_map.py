@@ -37,7 +37,8 @@ def local_map(state: State, begin: int) -> LocalMap:
     relative = np.array([step.relative for step in steps]).reshape(-1, poses.shape[1])
     covariances = np.array([step.covariances for step in steps]).reshape(-1, 3, k, k)
     odometry = Odometry(settings.pose_model, poses[0], relative, covariances[:, 0])
-    noise = StepNoise(covariances[:, 1], covariances[:, 2])
+    noise = StepNoise.isotropic(covariances[:, 1], covariances[:, 2])
+    believed = store.odometry_noise
     first_box = int(np.searchsorted(store.box_keyframe, begin))
     labels = store.labels.since(first_box)
     times = np.array([frame.timestamp for frame in frames])
@@ -47,7 +48,7 @@ def local_map(state: State, begin: int) -> LocalMap:
         box_noise=settings.box_noise,
         size_prior=store.size_prior,
         step_noise=noise if settings.estimates_noise else None,
-        odometry_noise=store.odometry_noise,
+        levels=np.array([believed.translation_m, believed.rotation_rad]),
     )
     scene.learns_size = settings.size_prior is None
     scene.poses = poses

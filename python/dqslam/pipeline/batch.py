@@ -41,7 +41,10 @@ def estimate_batch(
         object_id=found.object_id,
         keyframes=len(found.keyframes),
         size_prior=found.scene.size_prior,
+        box_noise=found.scene.box_noise,
         odometry_noise=found.scene.odometry_noise if tells_noise else None,
+        noise_levels=found.scene.noise_levels,
+        remarks=found.remarks,
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from dqslam import _core
 from dqslam._checks import Bools, Floats, Ints
 from dqslam.association import CHI2_GATE, FINAL
-from dqslam.assumptions import OdometryNoise, SizePrior, SizePriors
+from dqslam.assumptions import BoxNoise, OdometryNoise, SizePrior, SizePriors
 from dqslam.estimate import Estimate
 from dqslam.evaluation import trajectory_error
 from dqslam.io import Trajectory
@@ -23,6 +23,7 @@ from dqslam.pipeline.report import (
     describe_size_prior,
     describe_solver,
     describe_times,
+    warn_of_boxes,
 )
 from dqslam.recording import Detections
 from dqslam.uncertainty import Marginals
@@ -44,8 +45,14 @@ class EstimatorOutput:
     keyframes: int
     """Poses whose boxes took part."""
     size_prior: SizePrior | SizePriors
+    box_noise: BoxNoise
+    """What was believed in the end."""
     odometry_noise: OdometryNoise | None
-    """Of a step, where it was estimated."""
+    """Root mean square of a step, where it was estimated."""
+    noise_levels: dict[str, float] = field(default_factory=dict)
+    """Of its components: meters and radians a step, and shares of length and angle."""
+    remarks: tuple[str, ...] = ()
+    """What was noticed on the way, a sentence each."""
     live_poses: Floats | None = None
     """Of a session, before its last polish: world_from_robot, shape (n, d)."""
     step_ms: Floats | None = None
@@ -86,7 +93,7 @@ def conclude(
     object_id[~held_out] = output.object_id
     detections = replace(boxes, object_id=object_id)
     assigned = detections.select((object_id >= 0) & ~held_out)
-    chi2 = box_chi2(estimate, assigned, options.box_noise)
+    chi2 = box_chi2(estimate, assigned, output.box_noise)
     mapped = np.isin(assigned.object_id, estimate.object_ids)
     tests_held_out = bool(held_out.any())
     tested = detections.select(held_out if tests_held_out else ~held_out)
@@ -96,6 +103,7 @@ def conclude(
     if tests_held_out:
         object_id[held_out] = tested_id
     report = {
+        "warnings": [*output.remarks, *warn_of_boxes(len(output.object_id), int(mapped.sum()))],
         "mode": options.mode.name.lower(),
         "poses": len(estimate.timestamps),
         "keyframes": output.keyframes,
@@ -108,10 +116,10 @@ def conclude(
         "dropped_objects": {str(name): why for name, why in estimate.dropped.items()},
         "size_prior": describe_size_prior(output.size_prior),
         "reprojection": describe_overlap(overlap) | {"held_out": tests_held_out},
-        "box_noise": asdict(options.box_noise),
+        "box_noise": asdict(output.box_noise),
         "odometry_noise": {"from": "given"}
         if noise is None
-        else {"from": "estimated"} | asdict(noise),
+        else {"from": "estimated"} | asdict(noise) | {"levels": output.noise_levels},
         "under_constrained": [str(part) for part in output.marginals.under_constrained]
         if output.marginals
         else [],

@@ -22,12 +22,13 @@ def estimate_online(
     recording: Recording, options: RunOptions, progress: Progress
 ) -> EstimatorOutput:
     """Feed a recording to a session as it would arrive, and polish what the session has found."""
+    box_noise = options.box_noise or BoxNoise()
     slam = OnlineSlam(
         recording.camera,
         options.solve_options(),
         pose_model=recording.odometry.pose_model,
         first_pose=recording.odometry.first_pose,
-        box_noise=options.box_noise,
+        box_noise=box_noise,
         size_prior=options.size_prior,
         trust_ids=options.trust_ids,
         finds_movers=True,
@@ -47,11 +48,12 @@ def estimate_online(
     shown = replace(recording, detections=replace(recording.detections, object_id=object_id))
     return EstimatorOutput(
         _estimate(slam, recording) if is_final else slam.estimate(),
-        _marginals(slam, shown, options.box_noise),
+        _marginals(slam, shown, box_noise),
         summary,
         object_id=object_id,
         keyframes=len(slam.keyframes),
         size_prior=slam.size_prior,
+        box_noise=box_noise,
         odometry_noise=slam.odometry_noise,
         live_poses=live_poses,
         step_ms=np.array(step_ms),

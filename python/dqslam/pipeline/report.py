@@ -13,6 +13,9 @@ from dqslam.assumptions import BoxNoise, SizePrior, SizePriors
 from dqslam.estimate import Estimate
 from dqslam.recording import Detections
 
+# A map that fewer boxes show is worth a warning.
+ENOUGH_EXPLAINED = 0.5
+
 
 def box_chi2(estimate: Estimate, detections: Detections, noise: BoxNoise) -> NDArray[np.float64]:
     """Compare boxes with the estimate: chi-square with 4 dof, shape (m,).
@@ -45,6 +48,18 @@ def describe_boxes(chi2: NDArray[np.float64]) -> dict[str, Any]:
         "outlier_share": float(np.mean(chi2 > CHI2_GATE[4])) if len(chi2) else None,
         "not_in_front": int(np.sum(np.isinf(chi2))),
     }
+
+
+def warn_of_boxes(count: int, explained: int) -> list[str]:
+    """Say that most boxes, or all of them, are of no object of the map."""
+    if count == 0 or explained > ENOUGH_EXPLAINED * count:
+        return []
+    if explained == 0:
+        return [f"the map is empty, though there are {count} boxes: the odometry is uncorrected"]
+    return [
+        f"only {explained} of {count} boxes show an object of the map: the trajectory rests on "
+        "these, the others moved, were seen too rarely, or do not fit"
+    ]
 
 
 def describe_objects(

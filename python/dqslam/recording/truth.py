@@ -28,8 +28,8 @@ class Truth:
     ellipsoids: Floats | None = None
     """Center and log-Cholesky shape, shape (o, 9); None if the objects are no ellipsoids."""
     cuboids: Floats | None = None
-    """Center, half the sides, and world_from_object as a quaternion, of cuboids with three different
-    sides; shape (o, 10)."""
+    """Center, half the sides, and world_from_object as a quaternion, of cuboids with three
+    different sides; shape (o, 10)."""
     box_object_id: Ints | None = None
     """True object of each box of the recording, independent of its id; -1 for none; shape (m,)."""
 

@@ -99,7 +99,6 @@ def truncated_cost(solved: tuple[Estimate, Summary], options: SolveOptions) -> f
     estimate, summary = solved
     if options.loss not in (Loss.GNC_TLS, Loss.GNC_GM):
         return summary.final_cost
-    assert estimate.inliers is not None
     return summary.final_cost + 0.5 * options.outlier_chi_square * float(np.sum(~estimate.inliers))
 
 
