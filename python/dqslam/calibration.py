@@ -18,6 +18,9 @@ from dqslam.subgraph import only_objects
 SURE_SIGMAS = 4.0
 # Parameters that explain the residuals nearly as well as the best one, as a share of its sigmas.
 RIVAL_SHARE = 0.9
+# The tests are linear: where a larger value explains the residuals best, something else is wrong
+# with the boxes. By unit; a share has none.
+LARGEST = {"rad": 0.2, "m": 1.0, "px": 100.0, "": 0.2, "rad/s": 0.1, "s": 1.0}
 # A parameter whose information is a smaller share of what it would be with all poses and objects
 # known is not determined.
 LEAST_INFORMATION = 1e-6
@@ -92,6 +95,9 @@ def check_calibration(
     The most significant deviation comes first. Each later one is what the residuals show once the
     earlier ones are allowed for. The noise of odometry and of boxes is scaled to their residuals,
     so that a wrong level of noise is no finding. No poses or objects are estimated again.
+
+    The errors of boxes are taken to be independent. Detectors repeat theirs from image to image,
+    and objects are no ellipsoids: on recordings, take a finding of less than ten sigmas for a hint.
 
     Parameters
     ----------
@@ -284,14 +290,19 @@ class _Scores:
         return left > LEAST_INFORMATION * float(self.unchecked[row])
 
     def sigmas_beside(self, allowed: Sequence[int]) -> Floats:
-        """Return how significant each parameter is with some allowed for; 0 for those; (p,)."""
+        """Return how significant each parameter is with some allowed for, (p,).
+
+        It is 0 for those that are allowed for, not determined, or so large that the test fails.
+        """
         sigmas = np.zeros(len(self.score))
         for row in range(len(self.score)):
             if row in allowed or not self.is_determined(row, allowed):
                 continue
             weights = self.beside(row, allowed)
-            variance = float(weights @ self.covariance @ weights)
-            sigmas[row] = abs(float(weights @ self.score)) / np.sqrt(variance)
+            score = abs(float(weights @ self.score))
+            if score > LARGEST[self.units[row]] * float(weights @ self.information @ weights):
+                continue
+            sigmas[row] = score / np.sqrt(float(weights @ self.covariance @ weights))
         return sigmas
 
     def estimate(self, rows: Sequence[int]) -> tuple[Floats, Floats]:

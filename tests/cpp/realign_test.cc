@@ -56,8 +56,8 @@ class RealignOf : public testing::Test {
 using PoseTypes = testing::Types<Se2, Se3>;
 TYPED_TEST_SUITE(RealignOf, PoseTypes);
 
-// A drift of 1 rad over one lap ends in a loop that the boxes of the second lap close.  The odometry
-// errs by the same turn at each step, which is also the most likely correction.
+// A drift of 1 rad over one lap ends in a loop that the boxes of the second lap close.  The
+// odometry errs by the same turn at each step, which is also the most likely correction.
 TYPED_TEST(RealignOf, TakesTheDriftOutOfTheLoop) {
   Graph graph = this->scene_.graph;
   constexpr int kAnchor = 9, kBegin = 40;

@@ -40,7 +40,7 @@ def test_estimated_noise_is_as_good_as_given_noise(seed):
     assert noise["levels"]["rotation_z"] == pytest.approx(0.02, rel=0.25)
     # 100 mrad on steps that turn, an eighth of all: 40 mrad in the root mean square, of 8 turns.
     assert 0.03 <= noise["rotation_rad"] <= 0.065
-    assert result.report["box_noise"]["relative"] < 0.04  # less than the default of 0.05
+    assert result.report["box_noise"] == {"pixels": 2.0, "relative": 0.05}  # never less
     given = dq.run(recording)
     assert given.report["odometry_noise"] == {"from": "given"}
     assert error(given.estimate.poses, truth) <= 0.25

@@ -157,11 +157,22 @@ def test_objects_that_are_not_in_the_estimate_take_no_part():
     detections = recording.detections
     box = detections.box.copy()
     one = np.flatnonzero(detections.object_id == detections.object_id.max())
-    box[one] += np.random.default_rng(0).uniform(-200.0, 200.0, size=(len(one), 4)).cumsum(1)
-    box[one, 2:] = np.maximum(box[one, 2:], box[one, :2] + 5.0)
+    corner = np.random.default_rng(0).uniform(0.0, 500.0, size=(len(one), 2))
+    box[one] = np.hstack([corner, corner + 100.0])  # it jumps about in the image
     recording = replace(recording, detections=replace(detections, box=box))
     graph, estimate = solved(recording)
     assert len(estimate.dropped) == 1
     found = dq.check_calibration(graph, estimate)
     assert found[0].name == "mount_yaw"
     assert found[0].value == pytest.approx(np.deg2rad(2.0), abs=4.0 * found[0].sigma)
+
+
+def test_a_run_warns_of_a_turned_mount_and_reports_it():
+    recording, _ = recording_of(41, yaw=3.0)
+    report = dq.run(recording).report
+    assert "mount_yaw" in {report["calibration"][0]["name"], *report["calibration"][0]["rivals"]}
+    assert any(warning.startswith("the boxes say that") for warning in report["warnings"])
+    exact, _ = recording_of(41)
+    report = dq.run(exact).report
+    assert report["calibration"] == []
+    assert report["warnings"] == []

@@ -128,7 +128,7 @@ def test_dropped_objects_take_no_part():
     assert len(marginals.objects) == len(graph.object_ids) - 1
 
     kept[last] = False
-    without = replace(recording, detections=detections.select(kept))
+    without = replace(recording, detections=replace(detections, box=box).select(kept))
     alone = build_graph(without)
     expected = _core.covariance(
         alone.core, options, _core.State(estimate.poses, estimate.ellipsoids)

@@ -36,7 +36,8 @@ enum Parameter {
 template <typename Pose, typename Landmark>
 class ResidualRows {
  public:
-  ResidualRows(const SolveContext& context, const State& state) : context_(context), state_(state) {}
+  ResidualRows(const SolveContext& context, const State& state)
+      : context_(context), state_(state) {}
 
   template <typename Cost, typename... Rows>
   bool Visit(const Cost& cost, const Rows&... rows) {
@@ -80,7 +81,10 @@ VectorXd ResidualsOf(const Graph& graph,
 
 // The boxes of a state whose cameras are where they are `delay` seconds later.
 template <typename Pose>
-RowMatrix PredictBoxes(const Graph& graph, const State& state, const VectorXd& times, double delay) {
+RowMatrix PredictBoxes(const Graph& graph,
+                       const State& state,
+                       const VectorXd& times,
+                       double delay) {
   const Mount mount(graph.camera);
   const int last = graph.num_poses() - 1;
   RowMatrix boxes = RowMatrix::Constant(graph.boxes.size(), kBoxSize, std::nan(""));
@@ -93,9 +97,9 @@ RowMatrix PredictBoxes(const Graph& graph, const State& state, const VectorXd& t
     if (seconds > 0) motion *= delay / seconds;
     Eigen::Matrix<double, Pose::kSize, 1> moved;
     Plus<Pose>(state.poses.row(pose).data(), motion.data(), moved.data());
-    const Surface<double> surface = ToCamera(
-        LocateCamera<Pose>(moved.data(), mount),
-        EllipsoidModel::Unpack(state.landmarks.row(graph.boxes.object[row]).data()));
+    const Surface<double> surface =
+        ToCamera(LocateCamera<Pose>(moved.data(), mount),
+                 EllipsoidModel::Unpack(state.landmarks.row(graph.boxes.object[row]).data()));
     Eigen::Vector4d box;
     if (ProjectToBox(surface, graph.camera, &box)) boxes.row(row) = box.transpose();
   }
@@ -175,9 +179,8 @@ Graph Recalibrate(const Graph& graph,
       odometry.relative.row(row) = turned.transpose();
     }
     if (deviations[kDelay] != 0) {
-      const RowMatrix shift =
-          PredictBoxes<Pose>(graph, state, timestamps, deviations[kDelay]) -
-          PredictBoxes<Pose>(graph, state, timestamps, 0);
+      const RowMatrix shift = PredictBoxes<Pose>(graph, state, timestamps, deviations[kDelay]) -
+                              PredictBoxes<Pose>(graph, state, timestamps, 0);
       for (int row = 0; row < graph.boxes.size(); ++row) {
         if (shift.row(row).allFinite()) result.boxes.box.row(row) -= shift.row(row);
       }
@@ -204,9 +207,9 @@ CalibrationScore ScoreCalibration(const Graph& graph,
     const Graph above = Recalibrate(graph, state, timestamps, deviations);
     deviations[i] *= -1;
     const Graph below = Recalibrate(graph, state, timestamps, deviations);
-    by_parameter.col(i) = (ResidualsOf(above, options, terms, state) -
-                           ResidualsOf(below, options, terms, state)) /
-                          (2 * parameters[i].step);
+    by_parameter.col(i) =
+        (ResidualsOf(above, options, terms, state) - ResidualsOf(below, options, terms, state)) /
+        (2 * parameters[i].step);
   }
 
   const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor(Damped(information.matrix));

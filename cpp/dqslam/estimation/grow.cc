@@ -87,8 +87,8 @@ class Growth {
     std::vector<double> depths;
     for (int row = 0; row < graph_.boxes.size(); ++row) {
       const auto box = graph_.boxes.box.row(row);
-      const double side = std::sqrt((box[2] - box[0]) / graph_.camera.fx * (box[3] - box[1]) /
-                                    graph_.camera.fy);
+      const double side =
+          std::sqrt((box[2] - box[0]) / graph_.camera.fx * (box[3] - box[1]) / graph_.camera.fy);
       depths.push_back(2 * std::exp(graph_.size_prior.log_mean[graph_.boxes.object[row]]) / side);
     }
     const auto middle = depths.begin() + depths.size() / 2;
@@ -233,9 +233,9 @@ class Growth {
   State& state_;
   const double depth_;
   std::vector<bool> started_;
-  int whole_ = 1;        // the end of the poses when all of them were minimized last
-  int lost_since_ = -1;  // the first pose of a part that contradicts the map; -1 for none
-  State before_;         // the state when that part was added, by dead reckoning
+  int whole_ = 1;            // the end of the poses when all of them were minimized last
+  int lost_since_ = -1;      // the first pose of a part that contradicts the map; -1 for none
+  State before_;             // the state when that part was added, by dead reckoning
   std::vector<bool> known_;  // the objects that had been started then
   Summary total_;
 };

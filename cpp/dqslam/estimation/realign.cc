@@ -24,8 +24,8 @@ constexpr int kBendings = 5;      // Gauss-Newton iterations of the path
 struct Pair {
   int object;
   Vector3d seen, known;
-  double tolerance;   // meters
-  int last_view;      // the last pose before the new ones that has a box of it
+  double tolerance;  // meters
+  int last_view;     // the last pose before the new ones that has a box of it
   size_t views;
 };
 
@@ -70,8 +70,7 @@ class Realignment {
         if (pose >= begin_ && pose < end_) rows.push_back(row);
       }
       if (rows.empty()) continue;
-      const Surface<double> surface =
-          EllipsoidModel::Unpack(before_.landmarks.row(object).data());
+      const Surface<double> surface = EllipsoidModel::Unpack(before_.landmarks.row(object).data());
       const double radius = std::pow(surface.shape.determinant(), 1.0 / 6);
       const std::vector<View> views = ViewsOf(prepared_, before_, rows);
       pair.seen = FitSphere(graph.camera, views, {std::log(radius), kSizeSpread}).head<3>();
@@ -84,9 +83,8 @@ class Realignment {
       pair.views = rows.size();
       pairs.push_back(pair);
     }
-    std::stable_sort(pairs.begin(), pairs.end(), [](const Pair& a, const Pair& b) {
-      return a.views > b.views;
-    });
+    std::stable_sort(
+        pairs.begin(), pairs.end(), [](const Pair& a, const Pair& b) { return a.views > b.views; });
     if (pairs.size() > kMostObjects) pairs.resize(kMostObjects);
     return pairs;
   }

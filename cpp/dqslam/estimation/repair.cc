@@ -88,9 +88,8 @@ std::vector<Vector9d> OtherStarts(const SolveContext& context,
   options.start = Start::kSizePrior;
   const SolveContext by_size{context.prepared, options, context.monitor};
   const int count = static_cast<int>(boxes.size());
-  const auto misfits = std::count_if(boxes.begin(), boxes.end(), [&](int row) {
-    return !(2 * costs[row] <= kImpossibleBox);
-  });
+  const auto misfits = std::count_if(
+      boxes.begin(), boxes.end(), [&](int row) { return !(2 * costs[row] <= kImpossibleBox); });
   const bool is_mixed = count > kSomeBoxes && misfits > kMixed * count;
   std::vector<Vector9d> starts;
   if (count <= kFewBoxes || is_mixed || HasImpossibleSize(context, state, object)) {
@@ -206,10 +205,7 @@ void Recover(const SolveContext& context, const Stage& all, State* state, Summar
   KeepIfBetter(attempt, total, state, summary);
 }
 
-void TryOtherStarts(const SolveContext& context,
-                    const Stage& all,
-                    State* state,
-                    Summary* summary) {
+void TryOtherStarts(const SolveContext& context, const Stage& all, State* state, Summary* summary) {
   State attempt = *state;
   Summary total = *summary;
   bool any = false;

@@ -25,8 +25,9 @@ void Recover(const SolveContext& context, const Stage& all, State* state, Summar
 /// Objects with at most 3 boxes have several minima, mainly in depth; so have those whose size the
 /// prior excludes, and those with many boxes that do not fit.  Minimizes each of these by itself
 /// from the depth of the prior size, and the last ones from some of their boxes at a time as well.
-/// In SE(2), tilts all objects the other way, too, unless there is a loss.  Objects that reach a lower cost there are moved, the whole stage `all` is minimized, and the
-/// result is kept if the total cost is lower.  `summary` ends with that stage and is updated.
+/// In SE(2), tilts all objects the other way, too, unless there is a loss.  Objects that reach a
+/// lower cost there are moved, the whole stage `all` is minimized, and the result is kept if the
+/// total cost is lower.  `summary` ends with that stage and is updated.
 void TryOtherStarts(const SolveContext& context, const Stage& all, State* state, Summary* summary);
 
 /// Leaves out the stuck objects, minimizes the rest of the stage `all`, starts the stuck objects

@@ -135,9 +135,7 @@ class Solver {
 
  private:
   bool Refines() const { return options_.residual == Residual::kTangentThenBox; }
-  bool Graduates() const {
-    return options_.loss == Loss::kGncTls || options_.loss == Loss::kGncGm;
-  }
+  bool Graduates() const { return options_.loss == Loss::kGncTls || options_.loss == Loss::kGncGm; }
   bool Grows() const {
     return options_.schedule == Schedule::kGrow && options_.mode == Mode::kSlam;
   }
@@ -188,8 +186,8 @@ class Solver {
 };
 
 // Solves up to three times, by growing in smaller steps each time, as long as something speaks
-// against the result, and keeps the result with the lowest cost.  Two attempts that come to the same
-// cost confirm each other, however many boxes do not fit.
+// against the result, and keeps the result with the lowest cost.  Two attempts that come to the
+// same cost confirm each other, however many boxes do not fit.
 Summary SolveInAttempts(const SolveContext& context,
                         const std::optional<State>& start,
                         State* state) {

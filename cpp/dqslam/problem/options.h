@@ -64,8 +64,8 @@ struct SolveOptions {
   LandmarkModel landmark_model = LandmarkModel::kEllipsoid;
   Start start = Start::kSphere;
   Schedule schedule = Schedule::kGrow;
-  /// The default survives wrong ids and false boxes.  Where all boxes fit, it ends with the plain sum
-  /// of squares.
+  /// The default survives wrong ids and false boxes.  Where all boxes fit, it ends with the plain
+  /// sum of squares.
   Loss loss = Loss::kGncTls;
   /// Scale of the Huber and Cauchy losses, in sigmas of a whole box.
   double loss_scale = 2.0;

@@ -127,7 +127,8 @@ Summary Minimize(const TrustRegionOptions& options,
     if (has_step && promise <= kBrokenPromise * std::max(equations.cost, 1.0)) {
       converge(std::move(message));
     } else {
-      summary.message = Message("jammed: a decrease of", promise, "is left at cost", equations.cost);
+      summary.message =
+          Message("jammed: a decrease of", promise, "is left at cost", equations.cost);
     }
   };
   VectorXd step;

@@ -225,9 +225,7 @@ def _with_all_images(
     labels = Labels.of(recording.detections, cut)
     labels.votes = scene.labels.votes.copy()
     labels.object_of_tracklet = scene.labels.object_of_tracklet.copy()
-    everything = SceneMap(
-        recording, labels, box_noise=scene.judging_noise, size_prior=scene.size_prior
-    )
+    everything = SceneMap(recording, labels, box_noise=scene.box_noise, size_prior=scene.size_prior)
     everything.poses = fill_in(recording, keyframes, scene.poses)
     everything.ellipsoids = scene.ellipsoids
     return everything

@@ -67,8 +67,6 @@ class SceneMap:
         """What the boxes are called beyond this map, shape (m,)."""
         self.box_noise = box_noise
         self.learns_box_noise = learns_box_noise
-        self.judging_noise = box_noise
-        """What boxes are judged by: noise that is estimated may be too low where they are few."""
         self.box_covariance = box_noise.covariance(detections.box)
         self.mode = mode
         self.learns_size = size_prior is None
@@ -144,9 +142,8 @@ class SceneMap:
         """
         left_out = self.labels.left_out
         self.labels.left_out = left_out | dict.fromkeys(object_rows, "on trial")
-        noise, self.box_noise = self.box_noise, self.judging_noise
         graph = self.graph()
-        self.labels.left_out, self.box_noise = left_out, noise
+        self.labels.left_out = left_out
         if graph is None:
             return 0.0, self._path_by_odometry()
         solution = _core.solve(graph.core, self._options(max_iterations), self.state(graph))
@@ -263,18 +260,19 @@ class SceneMap:
         )
         used = in_front & ~boxes.truncated.any(axis=1) & (chi2 <= GATE[4])
         side = np.tile(boxes.box[:, 2:] - boxes.box[:, :2], (1, 2))
-        self.box_noise = corrected_boxes(
+        better = corrected_boxes(
             self.box_noise,
             (boxes.box - projected)[used].ravel(),
             side[used].ravel(),
             fit.box_redundancy / max(int(np.sum(~boxes.truncated)), 1),
         )
+        # Errors of a detector repeat from image to image of a video. They look smaller than they
+        # are, and noise that is estimated from boxes behind a gate may only fall.
         default = BoxNoise()
-        self.judging_noise = BoxNoise(
-            max(self.box_noise.pixels, default.pixels),
-            max(self.box_noise.relative, default.relative),
+        self.box_noise = BoxNoise(
+            max(better.pixels, default.pixels), max(better.relative, default.relative)
         )
-        self.box_covariance = self.judging_noise.covariance(self.recording.detections.box)
+        self.box_covariance = self.box_noise.covariance(self.recording.detections.box)
 
     def _believe_noise(self) -> None:
         if self.step_noise is None:

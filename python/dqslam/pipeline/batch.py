@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from dqslam import _core
 from dqslam.association import Association, associate, fill_in
+from dqslam.calibration import CalibrationFinding, check_calibration
 from dqslam.estimate import Estimate
 from dqslam.graph import solve
 from dqslam.pipeline.conclude import EstimatorOutput
@@ -32,7 +33,7 @@ def estimate_batch(
     )
     solver = options.solve_options()
     solver.schedule = _core.Schedule.BATCH
-    estimate, marginals, summary = _finish(recording, found, solver)
+    estimate, marginals, summary, findings = _finish(recording, found, solver)
     tells_noise = options.estimates_noise and options.mode != _core.Mode.MAPPING
     return EstimatorOutput(
         estimate,
@@ -45,18 +46,22 @@ def estimate_batch(
         odometry_noise=found.scene.odometry_noise if tells_noise else None,
         noise_levels=found.scene.noise_levels,
         remarks=found.remarks,
+        calibration=findings,
     )
 
 
 def _finish(
     recording: Recording, found: Association, options: _core.SolveOptions
-) -> tuple[Estimate, Marginals | None, _core.Summary | None]:
-    """Polish what the association ends with, and fill in the poses between the keyframes."""
+) -> tuple[Estimate, Marginals | None, _core.Summary | None, tuple[CalibrationFinding, ...]]:
+    """Polish what the association ends with, and fill in the poses between the keyframes.
+
+    Tests the calibration, too, unless the poses are given.
+    """
     odometry = recording.odometry
     path = _core.dead_reckon(odometry.pose_model, odometry.first_pose, odometry.relative)
     graph = found.scene.graph()
     if graph is None:
-        return _nothing(recording, path, found.left_out), None, None
+        return _nothing(recording, path, found.left_out), None, None, ()
     solved, summary = solve(graph, options, start=found.scene.state(graph))
     ids = found.ids[solved.object_ids]
     order = np.argsort(ids)
@@ -65,7 +70,7 @@ def _finish(
     dropped.pop(-1, None)
     nothing = _nothing(recording, path, dropped)
     if not order.size:
-        return nothing, None, None
+        return nothing, None, None, ()
     marginals = marginal_covariances(graph, solved, options)
     boxes = dict(zip(*np.unique(found.object_id, return_counts=True), strict=True))
     estimate = replace(
@@ -85,7 +90,9 @@ def _finish(
         objects=marginals.objects[order],
         under_constrained=tuple(_named(part, found) for part in marginals.under_constrained),
     )
-    return estimate, marginals, summary
+    is_slam = options.mode == _core.Mode.SLAM
+    findings = check_calibration(graph, solved, options) if is_slam else ()
+    return estimate, marginals, summary, findings
 
 
 def _named(part: UnderConstrained, found: Association) -> UnderConstrained:

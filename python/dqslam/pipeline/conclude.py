@@ -11,6 +11,7 @@ from dqslam import _core
 from dqslam._checks import Bools, Floats, Ints
 from dqslam.association import CHI2_GATE, FINAL
 from dqslam.assumptions import BoxNoise, OdometryNoise, SizePrior, SizePriors
+from dqslam.calibration import CalibrationFinding
 from dqslam.estimate import Estimate
 from dqslam.evaluation import trajectory_error
 from dqslam.io import Trajectory
@@ -24,6 +25,7 @@ from dqslam.pipeline.report import (
     describe_solver,
     describe_times,
     warn_of_boxes,
+    warn_of_calibration,
 )
 from dqslam.recording import Detections
 from dqslam.uncertainty import Marginals
@@ -53,6 +55,8 @@ class EstimatorOutput:
     """Of its components: meters and radians a step, and shares of length and angle."""
     remarks: tuple[str, ...] = ()
     """What was noticed on the way, a sentence each."""
+    calibration: tuple[CalibrationFinding, ...] = ()
+    """What the boxes say about camera, mount and odometry."""
     live_poses: Floats | None = None
     """Of a session, before its last polish: world_from_robot, shape (n, d)."""
     step_ms: Floats | None = None
@@ -103,7 +107,11 @@ def conclude(
     if tests_held_out:
         object_id[held_out] = tested_id
     report = {
-        "warnings": [*output.remarks, *warn_of_boxes(len(output.object_id), int(mapped.sum()))],
+        "warnings": [
+            *output.remarks,
+            *warn_of_boxes(len(output.object_id), int(mapped.sum())),
+            *warn_of_calibration(output.calibration),
+        ],
         "mode": options.mode.name.lower(),
         "poses": len(estimate.timestamps),
         "keyframes": output.keyframes,
@@ -120,6 +128,7 @@ def conclude(
         "odometry_noise": {"from": "given"}
         if noise is None
         else {"from": "estimated"} | asdict(noise) | {"levels": output.noise_levels},
+        "calibration": [asdict(finding) for finding in output.calibration],
         "under_constrained": [str(part) for part in output.marginals.under_constrained]
         if output.marginals
         else [],

@@ -26,8 +26,8 @@ class RunOptions:
     mode: _core.Mode = _core.Mode.SLAM
     """SLAM improves the odometry; MAPPING takes it for the truth."""
     box_noise: BoxNoise | None = None
-    """How far the edges of boxes are off; None is ``BoxNoise()``, or starts from it where the noise
-    is estimated."""
+    """How far the edges of boxes are off. None is ``BoxNoise()``, or more if the noise is estimated
+    and the boxes turn out to be worse."""
     size_prior: SizePrior | SizePriors | None = None
     """How large objects are, all of them or by class; None learns one size from those found."""
     estimates_noise: bool = False

@@ -10,11 +10,14 @@ from numpy.typing import NDArray
 from dqslam import _core
 from dqslam.association import CHI2_GATE
 from dqslam.assumptions import BoxNoise, SizePrior, SizePriors
+from dqslam.calibration import CalibrationFinding
 from dqslam.estimate import Estimate
 from dqslam.recording import Detections
 
 # A map that fewer boxes show is worth a warning.
 ENOUGH_EXPLAINED = 0.5
+# Score tests take the errors of boxes for independent. Those of real detectors are not.
+SURE_OF_CALIBRATION = 10.0  # sigmas
 
 
 def box_chi2(estimate: Estimate, detections: Detections, noise: BoxNoise) -> NDArray[np.float64]:
@@ -60,6 +63,11 @@ def warn_of_boxes(count: int, explained: int) -> list[str]:
         f"only {explained} of {count} boxes show an object of the map: the trajectory rests on "
         "these, the others moved, were seen too rarely, or do not fit"
     ]
+
+
+def warn_of_calibration(findings: tuple[CalibrationFinding, ...]) -> list[str]:
+    """Warn of deviations from the calibration that even repeated errors of boxes do not explain."""
+    return [str(finding) for finding in findings if finding.sigmas > SURE_OF_CALIBRATION]
 
 
 def describe_objects(
