@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 import oracle
 from dqslam import _core, load_scenario, simulate
 from dqslam.simulation.scenario import Scenario
-from dqslam.studies.paper import true_beliefs
+from dqslam.studies.paper import true_assumptions
 
 PAPER = load_scenario("paper")
 
@@ -61,7 +61,7 @@ def test_other_numbers_of_the_world_stay():
 
 def test_the_true_size_prior_of_proportions():
     """Mean and deviation of log semi-axes: log 0.3 + log(ratio / 2), and both spreads."""
-    prior = true_beliefs(proportioned()).size_prior
+    prior = true_assumptions(proportioned()).size_prior
     axes = [np.log(axes) for axes, _ in true_axes(proportioned(), range(40))]
     assert prior.log_mean == pytest.approx(np.log(0.3))
     unlike = np.log(2.0) * np.sqrt(2.0 / 3.0)
