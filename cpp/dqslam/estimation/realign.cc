@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "dqslam/estimation/grow.h"
+#include "dqslam/estimation/start_object.h"
 #include "dqslam/geometry/dispatch.h"
 
 namespace dqslam {

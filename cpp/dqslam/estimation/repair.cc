@@ -6,7 +6,7 @@
 #include <limits>
 #include <numeric>
 
-#include "dqslam/estimation/grow.h"
+#include "dqslam/estimation/start_object.h"
 #include "dqslam/geometry/dispatch.h"
 
 namespace dqslam {

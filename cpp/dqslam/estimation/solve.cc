@@ -9,6 +9,7 @@
 #include "dqslam/estimation/graduated.h"
 #include "dqslam/estimation/grow.h"
 #include "dqslam/estimation/repair.h"
+#include "dqslam/estimation/start_object.h"
 #include "dqslam/geometry/dispatch.h"
 #include "dqslam/problem/checks.h"
 
