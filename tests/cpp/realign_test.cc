@@ -49,8 +49,8 @@ class RealignOf : public testing::Test {
   }
 
   const Scene scene_ = MakeScene<Pose>(60, 2.0);
-  const SolveOptions options_;
-  const Monitor monitor_;
+  const SolveOptions options_{};
+  const Monitor monitor_{};
 };
 
 using PoseTypes = testing::Types<Se2, Se3>;

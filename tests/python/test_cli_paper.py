@@ -66,7 +66,7 @@ def test_the_bound_and_wrong_ids_add_to_each_row(tmp_path, capsys):
         assert row["failures"] == 0
         assert 0.3 < row["efficiency"] < 3.0
         assert row["optimum_rate"] in (0.0, 1.0)
-        assert 0.9 < row["inlier_precision"] <= 1.0
+        assert 0.85 < row["inlier_precision"] <= 1.0  # at the 99.9 % quantile
         assert row["volume_relative_error"]["med"] < 0.5
     shown = capsys.readouterr().out
     for label in ("error / bound", "95 % interval", "inliers, recall", "oracle: centers"):

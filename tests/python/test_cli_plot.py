@@ -83,6 +83,7 @@ def test_a_table_top_with_images_by_their_numbers(tmp_path, capsys):
         ]
     )  # fmt: skip
     assert code == 0
+    capsys.readouterr()
     (tmp_path / "rgb").mkdir()
     for number in (703, 1001):
         Image.new("RGB", (640, 480)).save(tmp_path / "rgb" / f"{number:06}.png")

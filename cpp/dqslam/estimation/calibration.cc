@@ -33,7 +33,7 @@ enum Parameter {
 };
 
 // A visitor that writes the residuals of all terms, in the order of ComputeInformation.
-template <typename Pose, typename Landmark>
+template <typename Pose>
 class ResidualRows {
  public:
   ResidualRows(const SolveContext& context, const State& state)
@@ -49,7 +49,7 @@ class ResidualRows {
   bool VisitBox(const StageBox& box) {
     const PoseRow pose{context_.graph().boxes.pose[box.row]};
     const ObjectRow object{context_.graph().boxes.object[box.row]};
-    return VisitBoxCost<Pose, Landmark>(
+    return VisitBoxCost<Pose, EllipsoidModel>(
         context_, box, [&](const auto& cost) { return Visit(cost, pose, object); });
   }
   const std::vector<double>& residuals() const { return residuals_; }
@@ -70,9 +70,9 @@ VectorXd ResidualsOf(const Graph& graph,
   const PreparedGraph prepared(graph, options.mode == Mode::kMapping);
   const Monitor no_monitor;
   const SolveContext context{prepared, options, no_monitor};
-  return Dispatch(graph.pose_model, options.landmark_model, [&](auto pose, auto landmark) {
-    ResidualRows<decltype(pose), decltype(landmark)> rows(context, state);
-    if (!VisitTerms<decltype(pose), decltype(landmark)>(prepared, terms, &rows)) {
+  return Dispatch(graph.pose_model, [&](auto pose) {
+    ResidualRows<decltype(pose)> rows(context, state);
+    if (!VisitTerms<decltype(pose), EllipsoidModel>(prepared, terms, &rows)) {
       throw std::runtime_error("calibration: a residual is undefined at this state");
     }
     return VectorXd(Eigen::Map<const VectorXd>(rows.residuals().data(), rows.residuals().size()));

@@ -80,6 +80,7 @@ bool CanTiltEitherWay(const SolveContext& context) {
 // speaks against that one.
 std::vector<Vector9d> OtherStarts(const SolveContext& context,
                                   const Stage& all,
+                                  bool from_parts,
                                   const State& state,
                                   const Eigen::VectorXd& costs,
                                   int object,
@@ -90,7 +91,7 @@ std::vector<Vector9d> OtherStarts(const SolveContext& context,
   const int count = static_cast<int>(boxes.size());
   const auto misfits = std::count_if(
       boxes.begin(), boxes.end(), [&](int row) { return !(2 * costs[row] <= kImpossibleBox); });
-  const bool is_mixed = count > kSomeBoxes && misfits > kMixed * count;
+  const bool is_mixed = from_parts && count > kSomeBoxes && misfits > kMixed * count;
   std::vector<Vector9d> starts;
   if (count <= kFewBoxes || is_mixed || HasImpossibleSize(context, state, object)) {
     starts.push_back(StartObject(by_size, state, object, boxes));
@@ -195,7 +196,7 @@ void RestartStuckObjects(const SolveContext& context,
 }
 
 void Recover(const SolveContext& context, const Stage& all, State* state, Summary* summary) {
-  if (summary->converged) return;
+  if (summary->converged || all.loss == Loss::kCauchy) return;
   Stage robust = all;
   robust.loss = Loss::kCauchy;
   State attempt = *state;
@@ -205,7 +206,11 @@ void Recover(const SolveContext& context, const Stage& all, State* state, Summar
   KeepIfBetter(attempt, total, state, summary);
 }
 
-void TryOtherStarts(const SolveContext& context, const Stage& all, State* state, Summary* summary) {
+void TryOtherStarts(const SolveContext& context,
+                    const Stage& all,
+                    bool from_parts,
+                    State* state,
+                    Summary* summary) {
   State attempt = *state;
   Summary total = *summary;
   bool any = false;
@@ -217,7 +222,8 @@ void TryOtherStarts(const SolveContext& context, const Stage& all, State* state,
     const Stage alone = StageOfObject(all, boxes, context.graph());
     State best = attempt;
     double lowest = std::numeric_limits<double>::infinity();
-    for (const Vector9d& start : OtherStarts(context, all, attempt, costs, object, boxes)) {
+    for (const Vector9d& start :
+         OtherStarts(context, all, from_parts, attempt, costs, object, boxes)) {
       State moved = attempt;
       moved.landmarks.row(object) = start;
       const double cost = Optimize(context, alone, &moved).final_cost;

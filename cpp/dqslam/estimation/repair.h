@@ -18,17 +18,18 @@ std::vector<bool> StuckObjects(const SolveContext& context, const Stage& stage, 
 bool IsTorn(const PreparedGraph& prepared, const State& state);
 
 /// A stage that has not converged, for instance since an object has collapsed on the way, is
-/// minimized again from where it is, first with the Cauchy loss, and the result is kept if the cost
-/// is lower.
+/// minimized again from where it is, first with the Cauchy loss if it has another one, and the
+/// result is kept if the cost is lower.
 void Recover(const SolveContext& context, const Stage& all, State* state, Summary* summary);
 
 /// Objects with at most 3 boxes have several minima, mainly in depth; so have those whose size the
-/// prior excludes, and those with many boxes that do not fit.  Minimizes each of these by itself
-/// from the depth of the prior size, and the last ones from some of their boxes at a time as well.
-/// In SE(2), tilts all objects the other way, too, unless there is a loss.  Objects that reach a
-/// lower cost there are moved, the whole stage `all` is minimized, and the result is kept if the
-/// total cost is lower.  `summary` ends with that stage and is updated.
-void TryOtherStarts(const SolveContext& context, const Stage& all, State* state, Summary* summary);
+/// prior excludes, and, if `from_parts`, those with many boxes that do not fit.  Minimizes each of
+/// these by itself from the depth of the prior size, and the last ones from some of their boxes at
+/// a time as well. In SE(2), tilts all objects the other way, too, unless there is a loss.  Objects
+/// that reach a lower cost there are moved, the whole stage `all` is minimized, and the result is
+/// kept if the total cost is lower.  `summary` ends with that stage and is updated.
+void TryOtherStarts(
+    const SolveContext& context, const Stage& all, bool from_parts, State* state, Summary* summary);
 
 /// Leaves out the stuck objects, minimizes the rest of the stage `all`, starts the stuck objects
 /// again from all their views, and minimizes everything.  Repeats this, at most twice, as long as

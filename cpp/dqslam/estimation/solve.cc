@@ -18,8 +18,9 @@ namespace {
 
 constexpr int kAttempts = 3;
 constexpr int kMaxRounds = 10;
-// The largest share of boxes beyond the 99.9 % quantile.
-constexpr double kMostMisfits = 0.05;
+// The largest share of boxes that may not fit: without a loss, or where another attempt can confirm
+// that they are outliers, and where a robust loss is believed that they are.
+constexpr double kMostMisfits = 0.05, kMostOutliers = 0.5;
 constexpr double kSameCost = 10;  // half squared sigmas
 
 void ValidateOptions(const SolveOptions& options) {
@@ -53,12 +54,13 @@ class Solver {
         graph_(context.graph()),
         options_(context.options) {}
 
-  /// Why a state cannot be the answer, in words; empty if nothing speaks against it.
-  std::string Objection(const State& state) const {
+  /// Why a state cannot be the answer, in words; empty if nothing speaks against it.  At most the
+  /// given share of the boxes may be beyond the 99.9 % quantile.
+  std::string Objection(const State& state, double most_misfits) const {
     if (IsAlgebraic(options_.residual)) return "";
     const Mask inliers = FitsAt(state, kBoxChiSquare999);
     const double misfits = 1.0 - inliers.cast<double>().mean();
-    if (misfits > kMostMisfits) {
+    if (misfits > most_misfits) {
       return std::to_string(static_cast<int>(std::round(100 * misfits))) +
              " % of the boxes do not fit";
     }
@@ -110,7 +112,7 @@ class Solver {
       Append(Batch(robust, state), &summary);
       if (!start && Refines()) {
         RestartStuckObjects(context_, robust, state, &summary);
-        TryOtherStarts(context_, robust, state, &summary);
+        TryOtherStarts(context_, robust, true, state, &summary);
       }
     }
     if (Graduates()) {
@@ -129,7 +131,7 @@ class Solver {
     if (Refines()) {
       Recover(context_, last, state, &summary);
       RestartStuckObjects(context_, last, state, &summary);
-      TryOtherStarts(context_, last, state, &summary);
+      TryOtherStarts(context_, last, false, state, &summary);
     }
     return summary;
   }
@@ -207,7 +209,8 @@ Summary SolveInAttempts(const SolveContext& context,
     Solver solver({context.prepared, variant, context.monitor});
     State reached;
     Summary summary = solver.Run(start, &reached);
-    const std::string objection = solver.Objection(reached);
+    const bool doubts = options.loss == Loss::kNone || repeats;
+    const std::string objection = solver.Objection(reached, doubts ? kMostMisfits : kMostOutliers);
     const double cost = solver.TruncatedCost(reached, summary);
     const bool confirmed = options.loss != Loss::kNone && std::abs(cost - lowest) < kSameCost;
     if (summary.converged && !objection.empty() && !confirmed) {

@@ -16,6 +16,7 @@ import numpy as np
 from dqslam import _core
 from dqslam._checks import Ints
 from dqslam.association.follow import Follower
+from dqslam.association.gating import GATE
 from dqslam.association.initiation import MIN_VIEWS
 from dqslam.association.refine import refine
 from dqslam.association.scene_map import SceneMap
@@ -44,9 +45,11 @@ class Attempt:
 
     @property
     def explained(self) -> int:
-        """Boxes of objects that take part."""
-        labels = self.scene.labels
-        return int(np.sum(labels.takes_part[labels.object_rows]))
+        """Boxes that fit an object that takes part."""
+        scene = self.scene
+        rows = np.flatnonzero(scene.labels.takes_part[scene.labels.object_rows])
+        chi2 = scene.chi2(rows, scene.ellipsoids[scene.labels.object_rows[rows]])
+        return int(np.sum(chi2 <= GATE[4]))
 
 
 def make_map(

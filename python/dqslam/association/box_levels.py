@@ -16,6 +16,19 @@ PRIOR_RESIDUALS = 10.0
 MAX_RATIO = 2.0
 # Edges are drawn to pixels: less is no noise of a detector.
 MIN_PIXELS = 0.1
+# Errors of a detector repeat from image to image of a video. They look smaller than they are, and
+# noise that is estimated from boxes behind a gate may only fall: it is never below the default.
+LEAST = BoxNoise()
+# With more noise, any boxes fit any objects.
+MOST = BoxNoise(pixels=10.0, relative=0.15)
+
+
+def within_limits(noise: BoxNoise) -> BoxNoise:
+    """Return the noise, not below the default and not so large that it explains everything."""
+    return BoxNoise(
+        float(np.clip(noise.pixels, LEAST.pixels, MOST.pixels)),
+        float(np.clip(noise.relative, LEAST.relative, MOST.relative)),
+    )
 
 
 def corrected_boxes(noise: BoxNoise, error: Floats, side: Floats, redundancy: float) -> BoxNoise:

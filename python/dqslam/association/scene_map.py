@@ -10,7 +10,7 @@ import numpy as np
 from dqslam import _core
 from dqslam._checks import Floats, Ints
 from dqslam._ids import ObjectRow
-from dqslam.association.box_levels import corrected_boxes
+from dqslam.association.box_levels import corrected_boxes, within_limits
 from dqslam.association.gating import GATE
 from dqslam.association.labels import Labels
 from dqslam.association.noise import StepNoise, corrected
@@ -266,12 +266,7 @@ class SceneMap:
             side[used].ravel(),
             fit.box_redundancy / max(int(np.sum(~boxes.truncated)), 1),
         )
-        # Errors of a detector repeat from image to image of a video. They look smaller than they
-        # are, and noise that is estimated from boxes behind a gate may only fall.
-        default = BoxNoise()
-        self.box_noise = BoxNoise(
-            max(better.pixels, default.pixels), max(better.relative, default.relative)
-        )
+        self.box_noise = within_limits(better)
         self.box_covariance = self.box_noise.covariance(self.recording.detections.box)
 
     def _believe_noise(self) -> None:
