@@ -111,7 +111,9 @@ def check_calibration(
     Raises
     ------
     ValueError
-        When the landmarks are free quadrics.
+        When the landmarks are free quadrics, or a box next to the estimate's is no box.
+    RuntimeError
+        When the box of an object is undefined at the estimate, or next to it.
 
     Examples
     --------
