@@ -176,3 +176,15 @@ def test_a_run_warns_of_a_turned_mount_and_reports_it():
     report = dq.run(exact).report
     assert report["calibration"] == []
     assert report["warnings"] == []
+
+
+@pytest.mark.parametrize("error", [RuntimeError, ValueError])
+def test_a_run_goes_on_where_the_calibration_cannot_be_tested(monkeypatch, error):
+    def fails(*_):
+        raise error("a residual is undefined at this state")
+
+    recording, _ = recording_of(41)
+    monkeypatch.setattr("dqslam.pipeline.batch.check_calibration", fails)
+    result = dq.run(recording)
+    assert result.report["calibration"] == []
+    assert len(result.estimate.object_ids) >= 5
