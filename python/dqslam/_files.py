@@ -9,13 +9,18 @@ import threading
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
+# A message that quotes a file may not be as long as the file.
+MOST_CHARACTERS = 1200
+
 
 class FileError(ValueError):
     """A mistake in a file, as ``path:line: message`` or ``path: message``."""
 
     def __init__(self, path: str | Path, message: str, line: int | None = None) -> None:
+        if len(message) > MOST_CHARACTERS:
+            message = message[:MOST_CHARACTERS] + "..."
         super().__init__(f"{path}: {message}" if line is None else f"{path}:{line}: {message}")
-        self.line = line
+        self.path, self.message, self.line = path, message, line
 
 
 class FileErrors(FileError):
@@ -26,21 +31,6 @@ class FileErrors(FileError):
         ValueError.__init__(self, "\n".join(map(str, in_order)))
         self.line = in_order[0].line
         self.errors = tuple(errors)
-
-
-def read_text(path: str | Path) -> str:
-    """Read a UTF-8 file; a missing, unreadable or empty one is a FileError."""
-    try:
-        text = Path(path).read_text(encoding="utf-8-sig")
-    except FileNotFoundError:
-        raise FileError(path, "no such file") from None
-    except OSError as error:
-        raise FileError(path, f"cannot be read: {error.strerror}") from None
-    except UnicodeDecodeError:
-        raise FileError(path, "is not a text file (UTF-8)") from None
-    if not text.strip():
-        raise FileError(path, "is empty")
-    return text
 
 
 def write_text(path: str | Path, parts: str | Iterable[str]) -> None:

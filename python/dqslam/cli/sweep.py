@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dqslam._files import read_text, uninterrupted, write_text
+from dqslam._files import uninterrupted, write_text
+from dqslam._input import read_text
 from dqslam.cli.options import BackendName, Jobs, ResultDirectory, Scheduler
 from dqslam.cli.output import Json, Output, Quiet
 from dqslam.cli.settings import CONFIG, ConfigFile, save_settings

@@ -13,7 +13,8 @@ from typing import Any, Literal, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
-from dqslam._files import FileError, FileErrors, read_text
+from dqslam._files import FileError, FileErrors
+from dqslam._input import read_text
 from dqslam.config.lines import Location, key_lines
 
 Model = TypeVar("Model", bound=BaseModel)

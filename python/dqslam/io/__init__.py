@@ -16,7 +16,10 @@ from dqslam.io.frames import frame_rate as frame_rate
 from dqslam.io.frames import read_frame_times as read_frame_times
 from dqslam.io.images import find_images as find_images
 from dqslam.io.mount import read_mount as read_mount
+from dqslam.io.notes import InputWarning as InputWarning
+from dqslam.io.notes import Notes as Notes
 from dqslam.io.ply import write_ply as write_ply
+from dqslam.io.reading import ReadOptions as ReadOptions
 from dqslam.io.recording import Dropped as Dropped
 from dqslam.io.recording import load_recording as load_recording
 from dqslam.io.recording import nearest_pose as nearest_pose

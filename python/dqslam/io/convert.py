@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -16,13 +16,14 @@ from dqslam.io.camera.rosbag import KIND as CAMERA_INFO
 from dqslam.io.detections import DETECTION_FORMATS, DetectionTable, read_detections
 from dqslam.io.detections.rosbag import KIND as DETECTION_ARRAY
 from dqslam.io.files import FileError, whole_folder
-from dqslam.io.formats import Format, Progress, choose_format, no_progress
+from dqslam.io.formats import Format, Progress, choose_format, guarded, no_progress
 from dqslam.io.frames import BY_NUMBER, FrameTimes, write_frame_times
+from dqslam.io.notes import Notes
 from dqslam.io.rosbag import NAME as BAG
 from dqslam.io.rosbag import bag_topics
 from dqslam.io.sources import KINDS, kind_of
 from dqslam.io.trajectory import TRAJECTORY_FORMATS, Trajectory, read_trajectory
-from dqslam.io.trajectory.rosbag import KIND as ODOMETRY
+from dqslam.io.trajectory.rosbag import KINDS as TRAJECTORIES
 
 FORMATS: dict[str, tuple[Format[Any], ...]] = {
     "camera": CAMERA_FORMATS,
@@ -31,9 +32,9 @@ FORMATS: dict[str, tuple[Format[Any], ...]] = {
 }
 # The files of a converted bag, unless one kind is selected.
 FROM_BAG = {
-    "camera": (CAMERA_INFO, "camera.json", "json"),
-    "trajectory": (ODOMETRY, "trajectory.txt", "tum"),
-    "detections": (DETECTION_ARRAY, "boxes.csv", "csv"),
+    "camera": ((CAMERA_INFO,), "camera.json", "json"),
+    "trajectory": (TRAJECTORIES, "trajectory.txt", "tum"),
+    "detections": ((DETECTION_ARRAY,), "boxes.csv", "csv"),
 }
 
 
@@ -52,8 +53,11 @@ class ConvertContext:
 
     size: tuple[int, int] | None = None  #: width and height of the image in px
     frames: FrameTimes | None = None
+    first_frame: int | None = None  #: number of the first frame in the file
     classes: dict[int, str] | None = None
     body_from_camera: ArrayLike | None = None
+    nms: float | None = None  #: boxes that overlap a better one by this much are left out
+    notes: Notes = field(default_factory=Notes)  #: collects what is left out and what is doubtful
 
 
 def convert(
@@ -94,9 +98,9 @@ def convert(
         return _convert(source, out, kind, format, target, topic, context, progress)
     named = _topics_by_kind(source, topics)
     there = set(bag_topics(source).values())
-    kinds = [kind for kind, (message, *_) in FROM_BAG.items() if message in there]
+    kinds = [kind for kind, (messages, *_) in FROM_BAG.items() if there & set(messages)]
     if not kinds:
-        known = ", ".join(message for message, *_ in FROM_BAG.values())
+        known = ", ".join(message for messages, *_ in FROM_BAG.values() for message in messages)
         raise FileError(source, f"has no topic of {known}")
     written: list[Written] = []
     with whole_folder(out) as folder:
@@ -155,10 +159,10 @@ def _topics_by_kind(source: Path, topics: Sequence[str]) -> dict[str, str]:
     messages = bag_topics(source)
     found: dict[str, str] = {}
     for topic in topics:
-        kinds = [kind for kind, (message, *_) in FROM_BAG.items() if messages.get(topic) == message]
+        kinds = [kind for kind, (known, *_) in FROM_BAG.items() if messages.get(topic) in known]
         if not kinds:
-            known = ", ".join(messages)
-            raise FileError(source, f"no topic {topic} that can be read (it has: {known})")
+            has = ", ".join(messages)
+            raise FileError(source, f"no topic {topic} that can be read (it has: {has})")
         found[kinds[0]] = topic
     return found
 
@@ -179,7 +183,7 @@ def _convert(
     origin = choose_format(source, format_name, FORMATS[kind], kind)
     frames = context.frames
     # Numbers of frames are enough if neither side has times.
-    timeless = frames is None and not origin.has_times(source)
+    timeless = frames is None and not guarded(source, origin.name, origin.has_times, source)
     if timeless and not target.needs_times:
         frames = BY_NUMBER
     if kind == "trajectory":
@@ -190,6 +194,7 @@ def _convert(
             body_from_camera=context.body_from_camera,
             topic=topic,
             progress=progress,
+            notes=context.notes,
         )
         return _write_trajectory(out, trajectory, target, times=not timeless)
     width, height = context.size or (None, None)
@@ -199,10 +204,13 @@ def _convert(
         width=width,
         height=height,
         frames=frames,
+        first_frame=context.first_frame,
         classes=context.classes,
         cut=False,
+        nms=context.nms,
         topic=topic,
         progress=progress,
+        notes=context.notes,
     )
     return _write_detections(out, table, target, context, times=not timeless)
 

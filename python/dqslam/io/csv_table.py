@@ -1,8 +1,12 @@
-"""CSV with a header: columns are found by name, in any order; # starts a comment line."""
+"""CSV with a header, also with ; or tabs: columns are found by name, in any order.
+
+# starts a comment line.
+"""
 
 from __future__ import annotations
 
 import csv
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +26,8 @@ class CsvTable:
     """Cells of each column, stripped."""
     lines: tuple[int, ...]
     """Number of the line in the file, from 1, of each row."""
+    header: int
+    """Number of the line of the header."""
 
     def __len__(self) -> int:
         """Return the number of rows below the header."""
@@ -58,13 +64,18 @@ class CsvTable:
             raise FileError(self.path, message.format(cell), self.lines[rows[0]])
 
 
+def delimiter_of(header: str) -> str:
+    """Return what separates the columns of a header: a comma, or else a semicolon or a tab."""
+    return next((one for one in (",", ";", "\t") if one in header), ",")
+
+
 def read_csv(
     path: str | Path, *, required: Sequence[str] = (), allow_empty: bool = False
 ) -> CsvTable:
     """Read a table that has the required columns and, by default, at least one row."""
     rows, lines = read_rows(path)
     try:
-        header, *records = csv.reader(rows, strict=True)
+        header, *records = csv.reader(rows, strict=True, delimiter=delimiter_of(rows[0]))
     except csv.Error as error:
         raise FileError(path, f"not CSV: {error}") from None
     names = [name.strip() for name in header]
@@ -72,9 +83,9 @@ def read_csv(
     if missing:
         message = f"no column {', '.join(missing)} (it has: {', '.join(names)})"
         raise FileError(path, message, lines[0])
-    twice = [name for name in names if names.count(name) > 1]
-    if twice:
-        raise FileError(path, f"{names.count(twice[0])} columns are named {twice[0]}", lines[0])
+    name, most = Counter(names).most_common(1)[0]
+    if most > 1:
+        raise FileError(path, f"{most} columns are named {name}", lines[0])
     if len(records) != len(rows) - 1:
         raise FileError(path, "not CSV: a quoted field runs over the end of its line")
     if not records and not allow_empty:
@@ -86,4 +97,4 @@ def read_csv(
         name: tuple(record[column].strip() for record in records)
         for column, name in enumerate(names)
     }
-    return CsvTable(str(path), columns, tuple(lines[1:]))
+    return CsvTable(str(path), columns, tuple(lines[1:]), lines[0])

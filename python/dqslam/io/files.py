@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dqslam._files import FileError as FileError
-from dqslam._files import read_text as read_text
 from dqslam._files import write_text as write_text
+from dqslam._input import read_text as read_text
 
 
 def read_rows(path: str | Path) -> tuple[list[str], list[int]]:
@@ -38,15 +38,22 @@ def parse_numbers(
     path: str | Path, name: str, cells: Sequence[str], lines: Sequence[int]
 ) -> NDArray[np.float64]:
     """Turn the cells of one column into finite numbers, shape (n,)."""
-    try:
-        values = np.array(list(map(float, cells)))
-    except ValueError:
-        _blame_cell(path, name, cells, lines)
-        raise
+    values = parse_floats(path, name, cells, lines)
     bad = np.flatnonzero(~np.isfinite(values))
     if bad.size:
         raise FileError(path, f"{name} is {cells[bad[0]].strip()}, not finite", lines[bad[0]])
     return values
+
+
+def parse_floats(
+    path: str | Path, name: str, cells: Sequence[str], lines: Sequence[int]
+) -> NDArray[np.float64]:
+    """Turn the cells of one column into numbers, shape (n,), which may be NaN or infinite."""
+    try:
+        return np.array(list(map(float, cells)), dtype=float)
+    except ValueError:
+        _blame_cell(path, name, cells, lines)
+        raise
 
 
 def parse_integers(

@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dqslam.io.csv_table import read_csv
 from dqslam.io.files import FileError, parse_numbers, read_rows, write_text
+from dqslam.io.image_names import image_name
 
 COLUMNS = ("frame", "timestamp")
 
@@ -45,7 +46,10 @@ class FrameTimes:
             return frames / self.rate
         for frame, line in zip(frames.tolist(), lines, strict=True):
             if frame not in self.table:
-                raise FileError(path, f"{self.source} has no time for frame {frame}", line)
+                hint = ""
+                if frame == max(self.table, default=0) + 1 and min(frames.tolist()) > 0:
+                    hint = "; if the file counts frames from 1, say --first-frame 1"
+                raise FileError(path, f"{self.source} has no time for frame {frame}{hint}", line)
         return np.array([self.table[frame] for frame in frames.tolist()], dtype=float)
 
 
@@ -102,23 +106,3 @@ def frame_table(frames: ArrayLike, times: ArrayLike) -> list[str]:
     pairs = zip(np.asarray(frames).tolist(), np.asarray(times, dtype=float).tolist(), strict=True)
     rows = [f"{frame},{time!r}\n" for frame, time in sorted(set(pairs))]
     return [",".join(COLUMNS) + "\n", *rows]
-
-
-def image_name(name: str) -> str:
-    """Return the name of an image without folder and ending: rgb/13.25.png is 13.25."""
-    last = name.replace("\\", "/").rsplit("/", 1)[-1]
-    stem, dot, ending = last.rpartition(".")
-    return stem if dot and ending.isalpha() else last
-
-
-def frame_of(name: str, frames: FrameTimes | None) -> int | None:
-    """Return the frame of an image: its place in the times, else the number in its name.
-
-    The number may follow a prefix: ``000042``, ``left_42``, ``frame-000042``. The frame is None if
-    there is neither.
-    """
-    name = image_name(name)
-    if frames is not None and name in frames.names:
-        return frames.names[name]
-    digits = name.replace("-", "_").rpartition("_")[2]
-    return int(digits) if digits.isascii() and digits.isdigit() and len(digits) < 16 else None

@@ -8,7 +8,8 @@ import numpy as np
 
 from dqslam._checks import Floats
 from dqslam.io.files import FileError
-from dqslam.io.frames import FrameTimes, frame_of, image_name
+from dqslam.io.frames import FrameTimes
+from dqslam.io.image_names import ImageNameError, frames_of_images, image_name
 from dqslam.io.recording import nearest_pose
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".ppm", ".pgm", ".tif", ".tiff", ".webp")
@@ -55,9 +56,19 @@ def find_images(
 
 def _framed(files: list[Path], frames: FrameTimes) -> tuple[list[Path], Floats]:
     """Return the images whose frame has a time, and their times."""
+    names = [file.name for file in files]
+    if frames.names:
+        numbers = [frames.names.get(image_name(name)) for name in names]
+    else:
+        try:
+            found, own_times = frames_of_images(names)
+        except ImageNameError as error:
+            raise FileError(files[error.row], str(error)) from None
+        if own_times is not None:
+            return list(files), own_times
+        numbers = list(found.tolist())
     kept, times = [], []
-    for file in files:
-        frame = frame_of(file.name, frames)
+    for file, frame in zip(files, numbers, strict=True):
         if frame is None or (frames.table is not None and frame not in frames.table):
             continue
         kept.append(file)

@@ -11,13 +11,19 @@ from numpy.typing import NDArray
 
 from dqslam import _core
 from dqslam.assumptions import OdometryNoise
-from dqslam.io.camera import read_camera
-from dqslam.io.detections import DetectionTable, read_detections
+from dqslam.io.detections import DetectionTable
 from dqslam.io.files import FileError
 from dqslam.io.frames import FrameTimes
+from dqslam.io.notes import Notes
+from dqslam.io.reading import (
+    ReadOptions,
+    check_topics,
+    read_boxes_file,
+    read_camera_file,
+    read_path_file,
+)
 from dqslam.io.sources import FormatNames
 from dqslam.io.step_covariances import read_step_covariances
-from dqslam.io.trajectory import read_trajectory
 from dqslam.recording import Detections, Odometry, Recording
 
 # With two boxes and a noisy path, the distance of an object cannot be separated from its size.
@@ -56,6 +62,8 @@ def load_recording(
     odometry_covariance: str | Path | None = None,
     formats: FormatNames | None = None,
     frames: FrameTimes | None = None,
+    reading: ReadOptions | None = None,
+    notes: Notes | None = None,
 ) -> tuple[Recording, Dropped]:
     """Read a recording in SE(3), where the robot is the camera, and the numbers of dropped boxes.
 
@@ -85,6 +93,11 @@ def load_recording(
         Names of the formats, for files that cannot be recognized.
     frames
         Times of the frames, for files that only number them: see ``choose_frame_times``.
+    reading
+        How the files are read beside that, by default ``ReadOptions()``.
+    notes
+        Collects what is left out of the files and what is doubtful in them; by default these are
+        warnings of Python, of the category ``InputWarning``.
 
     Raises
     ------
@@ -112,14 +125,19 @@ def load_recording(
         raise ValueError(f"min_score is {min_score:g}, not between 0 and 1")
     if max_time_difference is not None and not max_time_difference >= 0:
         raise ValueError(f"max_time_difference is {max_time_difference:g}, negative")
-    names = formats or FormatNames()
-    lens = read_camera(camera, names.camera)
-    times, path = read_trajectory(odometry, names.trajectory, frames=frames)
+    names, how = formats or FormatNames(), reading or ReadOptions()
+    own = Notes(max_bad=how.max_bad) if notes is None else notes
+    check_topics(camera, odometry, detections, how)
+    lens = read_camera_file(camera, names, how)
+    trajectory = read_path_file(odometry, names, frames, how, own)
+    times, path = trajectory
     if len(times) < 2:
         raise FileError(odometry, "one pose only: nothing moves")
-    table = read_detections(
-        detections, names.detections, width=lens.width, height=lens.height, frames=frames
+    table = read_boxes_file(
+        detections, lens, trajectory, names, frames, how, own, min_score=min_score
     )
+    if notes is None:
+        own.warn()
     object_id = _object_ids(table, ids)
     pose, late = nearest_pose(times, table.timestamp)
     tolerance = 0.5 * float(np.median(np.diff(times)))

@@ -7,7 +7,7 @@ describe itself are those of ROS 2 Humble and of vision_msgs 4.
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -67,6 +67,14 @@ def messages(
             progress(number / count)
 
 
+def kind_of_topic(path: str | Path, kinds: Sequence[str], topic: str | None) -> str | None:
+    """Return the kind of message of a topic, or else the first of ``kinds`` that a bag has."""
+    topics = bag_topics(path)
+    if topic is not None:
+        return topics.get(topic)
+    return next((kind for kind in kinds if kind in topics.values()), None)
+
+
 def bag_topics(path: str | Path) -> dict[str, str]:
     """Return the kind of message of each topic of a bag."""
     with _opened(path) as bag:
@@ -97,18 +105,20 @@ def _topics(bag: Any) -> list[tuple[str, str]]:
     return [(connection.topic, connection.msgtype) for connection in bag.connections]
 
 
-def topic_option(format_name: str, topic: str | None) -> dict[str, str]:
-    """Return the keyword argument for the topic of a bag's reader, or nothing without a topic."""
-    if topic is None:
-        return {}
-    if format_name != NAME:
+def check_topic(format_name: str, topic: str | None) -> None:
+    """Refuse a topic of anything but a bag."""
+    if topic is not None and format_name != NAME:
         raise ValueError(f"topic {topic}: only bags have topics, not {format_name}")
-    return {"topic": topic}
 
 
 def stamp_seconds(message: Any) -> float:
     """Return the time of a message's header in seconds."""
-    stamp = message.header.stamp
+    return seconds_of(message.header)
+
+
+def seconds_of(header: Any) -> float:
+    """Return the time of a header in seconds."""
+    stamp = header.stamp
     nanoseconds: int = stamp.sec * 10**9 + stamp.nanosec
     return nanoseconds / 10**9
 

@@ -6,12 +6,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from dqslam._input import exists
 from dqslam.io.camera import CAMERA_FORMATS
 from dqslam.io.detections import DETECTION_FORMATS
 from dqslam.io.files import FileError, read_rows, read_text
-from dqslam.io.formats import choose_format, look_at
+from dqslam.io.formats import choose_format, guarded, look_at
 from dqslam.io.frames import BY_NUMBER, FrameTimes
-from dqslam.io.rosbag import looks_like_bag
+from dqslam.io.rosbag import bag_topics, looks_like_bag
 from dqslam.io.trajectory import TRAJECTORY_FORMATS
 
 
@@ -70,7 +71,27 @@ def choose_frame_times(
     """
     path = choose_format(odometry, formats.trajectory, TRAJECTORY_FORMATS, "trajectory")
     boxes = choose_format(detections, formats.detections, DETECTION_FORMATS, "detections")
-    return None if path.has_times(Path(odometry)) or boxes.name == "rosbag" else BY_NUMBER
+    timed = guarded(odometry, path.name, path.has_times, Path(odometry))
+    return None if timed or boxes.name == "rosbag" else BY_NUMBER
+
+
+def topic_of(path: str | Path, kinds: Sequence[str], topics: Sequence[str]) -> str | None:
+    """Return the topic among ``topics`` that has messages of one of these kinds in a bag.
+
+    The result is None for a file that is no bag, and for a bag without such a topic.
+
+    Raises
+    ------
+    ValueError
+        If there are two such topics.
+    """
+    if not topics or not exists(path) or not looks_like_bag(look_at(path)):
+        return None
+    has = bag_topics(path)
+    found = [topic for topic in dict.fromkeys(topics) if has.get(topic) in kinds]
+    if len(found) > 1:
+        raise ValueError(f"topics {found[0]} and {found[1]} are both of {has[found[0]]}")
+    return found[0] if found else None
 
 
 def kind_of(path: str | Path) -> str | None:
@@ -91,7 +112,7 @@ def kind_of(path: str | Path) -> str | None:
         ("trajectory", TRAJECTORY_FORMATS),
         ("detections", DETECTION_FORMATS),
     ):
-        if any(format_.recognize(look) for format_ in formats):
+        if any(guarded(path, one.name, one.recognize, look) for one in formats):
             return kind
     if look.path.is_file():
         read_rows(path)  # its error names the cause: empty, comments only, or no text

@@ -3,11 +3,12 @@
 It is ``P2:`` in the files of the odometry, tracking and object benchmarks, and ``P_rect_02:`` in
 the raw ``calib_cam_to_cam.txt``. There is no distortion, and integer pixel coordinates are pixel
 centers. Only the raw file has the image size, ``S_rect_02:``; the others need such a line added,
-for instance ``S_rect_02: 1242 375``.
+for instance ``S_rect_02: 1242 375``, or the size beside them.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from dqslam import _core
@@ -20,8 +21,10 @@ SIZE = "S_rect_02"
 STARTS = ("P0:", "P2:", "P_rect_02:", "calib_time:")
 
 
-def read_kitti_calib(path: str | Path) -> _core.Camera:
-    """Read camera 2 of a KITTI calibration."""
+def read_kitti_calib(
+    path: str | Path, *, image_size: tuple[int, int] | None = None
+) -> _core.Camera:
+    """Read camera 2 of a KITTI calibration; ``image_size`` px is used if the file has none."""
     rows, lines = read_rows(path)
     entries = [row.partition(":") for row in rows]
     line_of = {key.strip(): line for (key, _, _), line in zip(entries, lines, strict=True)}
@@ -29,11 +32,13 @@ def read_kitti_calib(path: str | Path) -> _core.Camera:
     name = next((name for name in PROJECTIONS if name in cells), None)
     if name is None:
         raise FileError(path, f"no line P2 or P_rect_02 (it has: {', '.join(cells)})")
-    if SIZE not in cells:
-        message = f'no image size: add a line "{SIZE}: WIDTH HEIGHT"'
+    if SIZE not in cells and image_size is None:
+        message = f'no image size: add a line "{SIZE}: WIDTH HEIGHT", or say --image-size'
         raise FileError(path, message)
     projection = _numbers(path, name, cells[name], 12, line_of[name])
-    size = _numbers(path, SIZE, cells[SIZE], 2, line_of[SIZE])
+    size: Sequence[float] = image_size or ()
+    if SIZE in cells:
+        size = _numbers(path, SIZE, cells[SIZE], 2, line_of[SIZE])
     fx, skew, cx, _, zero, fy, cy, _, *last = projection
     if (skew, zero, *last[:3]) != (0, 0, 0, 0, 1):
         raise FileError(path, f"{name} is no projection of a rectified camera", line_of[name])
@@ -41,7 +46,10 @@ def read_kitti_calib(path: str | Path) -> _core.Camera:
         zip(("fx", "fy", "cx", "cy", "width", "height"), (fx, fy, cx, cy, *size), strict=True)
     )
     return make_camera(
-        path, values, [0.0] * 5, lambda key: line_of[SIZE if key in ("width", "height") else name]
+        path,
+        values,
+        [0.0] * 5,
+        lambda key: line_of.get(SIZE if key in ("width", "height") else name),
     )
 
 

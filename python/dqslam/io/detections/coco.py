@@ -1,10 +1,12 @@
 """Detections as COCO results: JSON, a list of ``{image_id, category_id, bbox, score}``.
 
 ``bbox`` is x, y, width, height in pixels that count from the corner of the image, so that the first
-pixel spans 0 to 1. Half a pixel is therefore subtracted from the corners. A dataset, ``{images,
-annotations, categories}``, can be read too. The frame is ``image_id`` if that is a whole number,
-else it comes from the name of the image, see `dqslam.io.frames.frame_of`. Names of classes are
-those of ``classes``, else of ``categories``, else the number. A missing score is 1.
+pixel spans 0 to 1. Half a pixel is therefore subtracted from the corners. Without ``bbox`` it is
+the box around ``segmentation``. A dataset, ``{images, annotations, categories}``, can be read too.
+The frame is the number in the name of the image's file, if there are ``images``, or else in
+``image_id``; see `coco_images`. Names of classes are those of ``classes``, else of ``categories``,
+else the number. A missing score is 1; it may be named ``confidence`` or ``conf``. Boxes of crowds
+(``iscrowd``) are left out.
 
 Entries may have further keys, which we write and which COCO's own tools ignore: ``category_name``,
 ``timestamp`` [s], ``track_id``. Without ``timestamp`` the times are those of the frames.
@@ -13,62 +15,97 @@ Entries may have further keys, which we write and which COCO's own tools ignore:
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from dqslam.io.detections.coco_images import coco_images
+from dqslam.io.detections.coco_masks import segmentation_box
+from dqslam.io.detections.columns import known_columns
 from dqslam.io.detections.json_list import Entry, parse_entries
-from dqslam.io.detections.table import NO_SCORE, NO_TRACK, DetectionTable
+from dqslam.io.detections.records import Records, make_table
+from dqslam.io.detections.table import NO_SCORE, DetectionTable
 from dqslam.io.files import FileError, read_text, write_text
-from dqslam.io.formats import Format, Look
-from dqslam.io.frames import FrameTimes, frame_of
+from dqslam.io.formats import Format, Look, ReadContext
 
 CORNER = 0.5  #: COCO's pixel coordinates minus ours
 DIGITS = 6  #: decimals of a written box
+# Keys of COCO and of programs that write it, which say nothing more about a box.
+IGNORED = {
+    *("image_id", "bbox", "bbox_mode", "id", "area", "iscrowd", "ignore", "segmentation"),
+    *("keypoints", "num_keypoints", "attributes", "supercategory", "video_id", "license"),
+}
+XYXY, XYWH = 0, 1  #: values of Detectron2's bbox_mode
 
 
-def read_coco(
+def read_coco(path: str | Path, context: ReadContext) -> DetectionTable:
+    """Read boxes, unchecked."""
+    entries, rest = parse_entries(path, read_text(path), "annotations")
+    return coco_table(path, "coco", entries, rest, context)
+
+
+def coco_table(
     path: str | Path,
-    *,
-    width: int | None = None,
-    height: int | None = None,
-    frames: FrameTimes | None = None,
-    classes: dict[int, str] | None = None,
+    format_name: str,
+    entries: Sequence[Entry],
+    rest: dict[str, Any],
+    context: ReadContext,
 ) -> DetectionTable:
-    """Read boxes, unchecked; times of ``frames`` and names of ``classes`` override the file's."""
-    text = read_text(path)
-    entries, rest = parse_entries(path, text, "annotations")
+    """Make a table of COCO's entries and of what is beside them in a dataset."""
     if not entries:
         raise FileError(path, "holds no boxes")
-    names = _categories(path, rest.get("categories")) | (classes or {})
-    images = _image_names(path, rest.get("images"))
-    frame = [_frame(entry, images, frames) for entry in entries]
-    class_id = [entry.integer("category_id") for entry in entries]
-    box = np.array([entry.numbers("bbox", 4) for entry in entries])
-    box[:, 2:] += box[:, :2]
-    lines = [entry.line for entry in entries]
-    given = zip(entries, class_id, strict=True)
-    tracked = any("track_id" in entry.fields for entry in entries)
-    return DetectionTable(
-        path=str(path),
+    crowds = sum(bool(entry.fields.get("iscrowd")) for entry in entries)
+    context.notes.skip(path, "boxes", "boxes of crowds (iscrowd)", crowds, len(entries))
+    entries = [entry for entry in entries if not entry.fields.get("iscrowd")]
+    if not entries:
+        raise FileError(path, "holds no boxes but those of crowds")
+    keys = dict.fromkeys(key for entry in entries for key in entry.fields)
+    known = known_columns(path, (key for key in keys if key not in IGNORED), context.notes)
+    images = coco_images(path, entries, rest.get("images"), context)
+    timed = known.get("timestamp")
+    scored = known.get("score")
+
+    def labels(name: str) -> list[str] | None:
+        return [entry.label(known[name]) for entry in entries] if name in known else None
+
+    if "class_id" not in known and "class_name" not in known:
+        entries[0].value("category_id")
+    records = Records(
         columns=tuple(entries[0].fields),
-        line=np.array(lines),
-        frame=np.array(frame, dtype=np.int64),
-        timestamp=_times(path, entries, frame, frames),
-        box=box - CORNER,
-        score=np.array([entry.number("score", NO_SCORE) for entry in entries]),
-        class_id=np.array(class_id, dtype=np.int64),
-        class_name=tuple(
-            names.get(number, str(entry.fields.get("category_name", number)))
-            for entry, number in given
+        line=[entry.line for entry in entries],
+        box=np.array([_corners(entry) for entry in entries]) - CORNER,
+        frame=images.numbers,
+        image=images.names,
+        all_images=images.all_names,
+        time=None if timed is None else np.array([entry.number(timed) for entry in entries]),
+        score=(
+            None
+            if scored is None
+            else np.array([entry.number(scored, NO_SCORE) for entry in entries])
         ),
-        track_id=(
-            np.array([entry.integer("track_id", NO_TRACK) for entry in entries], dtype=np.int64)
-            if tracked
-            else None
-        ),
+        class_id=labels("class_id"),
+        class_name=labels("class_name"),
+        track_id=labels("track_id"),
+        class_names=_categories(path, rest.get("categories")),
+        image_size=images.size,
     )
+    return make_table(path, format_name, records, context)
+
+
+def _corners(entry: Entry) -> list[float]:
+    """Return the corners of a box in COCO's pixels."""
+    if "bbox" not in entry.fields and "segmentation" in entry.fields:
+        x, y, w, h = segmentation_box(entry)
+    else:
+        x, y, w, h = entry.numbers("bbox", 4)
+    mode = entry.fields.get("bbox_mode", XYWH)
+    if mode == XYXY:
+        return [x, y, w, h]
+    if mode != XYWH:
+        raise entry.error(f"bbox_mode is {mode!r}, not {XYXY} (corners) or {XYWH} (x y w h)")
+    return [x, y, x + w, y + h]
 
 
 def write_coco(path: str | Path, table: DetectionTable, *, times: bool = True) -> None:
@@ -105,51 +142,13 @@ def read_categories(path: str | Path) -> dict[int, str]:
     return {entry.integer("id"): entry.text("name") for entry in entries}
 
 
-def _frame(entry: Entry, images: dict[Any, str], frames: FrameTimes | None) -> int:
-    image = entry.value("image_id")
-    name = images.get(image) if isinstance(image, int | str) else None
-    # A dataset may number its images in any way, so names of images with times come first.
-    if name is not None and frames is not None and frames.names:
-        number = frame_of(name, frames)
-        if number is None:
-            raise entry.error(f"{frames.source} has no image {name}")
-        return number
-    if isinstance(image, str):
-        number = frame_of(image, frames)
-        if number is None:
-            message = f"image_id {image!r} is no number of a frame, and in no --frame-times"
-            raise entry.error(message)
-        return number
-    return entry.integer("image_id")
-
-
-def _times(
-    path: str | Path, entries: list[Entry], frame: list[int], frames: FrameTimes | None
-) -> Any:
-    if frames is not None:
-        return frames.at(path, np.array(frame), [entry.line for entry in entries])
-    if "timestamp" not in entries[0].fields:
-        message = "coco has no times: give them with --frame-times FILE or --frame-rate HZ"
-        raise FileError(path, message)
-    return np.array([entry.number("timestamp") for entry in entries])
-
-
-def _categories(path: str | Path, content: Any) -> dict[int, str]:
+def _categories(path: str | Path, content: Any) -> dict[str, str]:
     if content is None:
         return {}
     try:
-        return {int(item["id"]): str(item["name"]) for item in content}
-    except (KeyError, TypeError, ValueError):
-        raise FileError(path, "categories is no list of {id, name}") from None
-
-
-def _image_names(path: str | Path, content: Any) -> dict[Any, str]:
-    if content is None:
-        return {}
-    try:
-        return {item["id"]: str(item["file_name"]) for item in content if "file_name" in item}
+        return {str(item["id"]): str(item["name"]) for item in content}
     except (KeyError, TypeError):
-        raise FileError(path, "images is no list of {id, file_name}") from None
+        raise FileError(path, "categories is no list of {id, name}") from None
 
 
 def _looks(look: Look) -> bool:

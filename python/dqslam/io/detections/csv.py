@@ -1,57 +1,91 @@
 """Detections as CSV: ``frame,timestamp,x1,y1,x2,y2,score,class_id,class_name,track_id``.
 
 Corners are in pixels, with whole numbers at pixel centers, counted from 0.
-The columns are found by name, in any order; others are ignored, and ``track_id`` may be absent.
-An empty score is 1, because trackers give none. An empty ``track_id`` or -1 means that the box has
-no object. Rows may be in any order, but later frames have later times. # starts a comment line.
+The columns are found by name, in any order, also by the names that other programs give them
+(``xmin``, ``confidence``, ``name``, ...: see `columns`). Edges with such names, among them ``left
+top width height``, count from the corner of the image, as those programs do, so half a pixel is
+subtracted. The corners are needed, and one of
+``frame``, ``timestamp`` and ``image``; boxes of one ``timestamp`` are of one image if there is
+nothing else. An empty score is 1, because trackers give none. An empty ``track_id`` or -1 means
+that the box has no object. Rows may be in any order, but later frames have later times.
+# starts a comment line.
 """
 
 from __future__ import annotations
 
 import csv
 import io
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
+from dqslam._checks import Floats
+from dqslam.io.csv_table import CsvTable, delimiter_of
 from dqslam.io.csv_table import read_csv as read_table
-from dqslam.io.detections.table import NO_SCORE, NO_TRACK, DetectionTable
-from dqslam.io.files import parse_numbers, write_text
-from dqslam.io.formats import Format, Look
-from dqslam.io.frames import FrameTimes
+from dqslam.io.detections.columns import (
+    CORNERS,
+    MEANING,
+    SIZES,
+    counted_from_corner,
+    known_columns,
+    plain,
+)
+from dqslam.io.detections.records import Records, make_table
+from dqslam.io.detections.table import NO_SCORE, DetectionTable
+from dqslam.io.files import FileError, parse_floats, write_text
+from dqslam.io.formats import Format, Look, ReadContext, look_at
 
-BOX = ("x1", "y1", "x2", "y2")
-REQUIRED = ("frame", "timestamp", *BOX, "score", "class_id", "class_name")
+CORNER = 0.5  #: other programs' pixel coordinates minus ours
+COLUMNS = ("frame", "timestamp", *CORNERS, "score", "class_id", "class_name")
 
 
-def read_csv(
-    path: str | Path,
-    *,
-    width: int | None = None,
-    height: int | None = None,
-    frames: FrameTimes | None = None,
-    classes: dict[int, str] | None = None,
-) -> DetectionTable:
-    """Read boxes, unchecked; times of ``frames`` and names of ``classes`` override the file's."""
-    cells = read_table(path, required=REQUIRED)
-    frame, class_id = cells.integers("frame"), cells.integers("class_id")
-    scores = [score or str(NO_SCORE) for score in cells.cells("score")]
-    tracked = "track_id" in cells
-    named = zip(class_id.tolist(), cells.cells("class_name"), strict=True)
-    return DetectionTable(
-        path=str(path),
+def read_csv(path: str | Path, context: ReadContext) -> DetectionTable:
+    """Read boxes, unchecked."""
+    cells = read_table(path)
+    names = known_columns(path, cells.columns, context.notes)
+    edges = SIZES if not {"x2", "y2"} & set(names) and "width" in names else CORNERS
+    missing = [name for name in edges if name not in names]
+    if not {"frame", "timestamp", "image"} & set(names):
+        missing.insert(0, "frame, timestamp or image")
+    if missing:
+        message = f"no column {', '.join(missing)} (it has: {', '.join(cells.columns)})"
+        raise FileError(path, message, cells.header)
+    # Numbers of frames go before names of images.
+    numbered = "frame" in names
+    records = Records(
         columns=tuple(cells.columns),
-        line=np.array(cells.lines),
-        frame=frame,
-        timestamp=(
-            cells.numbers("timestamp") if frames is None else frames.at(path, frame, cells.lines)
-        ),
-        box=np.column_stack([cells.numbers(name) for name in BOX]),
-        score=parse_numbers(path, "score", scores, cells.lines),
-        class_id=class_id,
-        class_name=tuple((classes or {}).get(number, name) for number, name in named),
-        track_id=cells.integers("track_id", empty=str(NO_TRACK)) if tracked else None,
+        line=cells.lines,
+        box=_boxes(cells, edges, [names[name] for name in edges]),
+        frame=cells.integers(names["frame"]) if numbered else None,
+        image=cells.cells(names["image"]) if "image" in names and not numbered else None,
+        time=_floats(cells, names["timestamp"]) if "timestamp" in names else None,
+        score=_floats(cells, names["score"], NO_SCORE) if "score" in names else None,
+        **{
+            name: cells.cells(names[name]) if name in names else None
+            for name in ("class_id", "class_name", "track_id")
+        },
     )
+    return make_table(path, "csv", records, context)
+
+
+def _boxes(cells: CsvTable, edges: Sequence[str], names: Sequence[str]) -> Floats:
+    """Return corners (m, 4) px."""
+    box = np.column_stack([_floats(cells, name) for name in names])
+    if edges == SIZES:
+        box[:, 2:] += box[:, :2]
+    return box - CORNER if counted_from_corner(names) else box
+
+
+def _floats(cells: CsvTable, name: str, empty: float = float("nan")) -> Floats:
+    """Return a column as numbers; tables of pandas have empty cells where there is no number."""
+    texts = [cell or repr(empty) for cell in cells.cells(name)]
+    return parse_floats(cells.path, name, texts, cells.lines)
+
+
+def has_times(path: Path) -> bool:
+    """Return whether there is a column of times."""
+    return "timestamp" in _meanings(look_at(path))
 
 
 def write_csv(path: str | Path, table: DetectionTable) -> None:
@@ -59,7 +93,7 @@ def write_csv(path: str | Path, table: DetectionTable) -> None:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     tracks = () if table.track_id is None else ("track_id",)
-    writer.writerow((*REQUIRED, *tracks))
+    writer.writerow((*COLUMNS, *tracks))
     columns = [
         table.frame.tolist(),
         map(repr, table.timestamp.tolist()),
@@ -80,14 +114,20 @@ def short(value: float) -> str:
 
 
 def _looks(look: Look) -> bool:
-    return look.suffix == ".csv" or {"x1", "y1"} <= set(look.first.replace(" ", "").split(","))
+    return look.suffix == ".csv" or {"x1", "y1"} <= _meanings(look)
+
+
+def _meanings(look: Look) -> set[str]:
+    names = (plain(name.strip('"')) for name in look.first.split(delimiter_of(look.first)))
+    return {MEANING[name] for name in names if name in MEANING}
 
 
 CSV = Format(
     "csv",
-    "its name ends in .csv, or its header has x1 and y1",
+    "its name ends in .csv, or its header has x1 and y1 (or xmin, left, ...)",
     _looks,
     read_csv,
     write_csv,
+    has_times=has_times,
     endings=(".csv",),
 )

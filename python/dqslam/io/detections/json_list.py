@@ -1,4 +1,4 @@
-"""A list of objects in a JSON file, each with its line."""
+"""Lists of objects in JSON and JSON-lines files, each object with its line."""
 
 from __future__ import annotations
 
@@ -34,23 +34,23 @@ class Entry:
         return self.fields[key]
 
     def number(self, key: str, default: float | None = None) -> float:
-        """Return a finite number; null counts as missing."""
+        """Return a number, which may be NaN or infinite; null counts as missing."""
         value = self.value(key) if default is None else self.fields.get(key)
         if value is None and default is not None:
             return default
         return self._number(key, value)
 
     def numbers(self, key: str, count: int) -> list[float]:
-        """Return a list of finite numbers with the given length."""
+        """Return a list of numbers with the given length, which may be NaN or infinite."""
         values = self.value(key)
         if not isinstance(values, list) or len(values) != count:
             raise self.error(f"{key} is not a list of {count} numbers")
         return [self._number(key, value) for value in values]
 
-    def integer(self, key: str, default: int | None = None) -> int:
-        """Return a whole number; null counts as missing."""
-        value = self.number(key, default)
-        if value != math.floor(value) or abs(value) >= 2.0**53:
+    def integer(self, key: str) -> int:
+        """Return a whole number."""
+        value = self.number(key)
+        if not math.isfinite(value) or value != math.floor(value) or abs(value) >= 2.0**53:
             raise self.error(f"{key} is {value:g}, not a whole number")
         return int(value)
 
@@ -61,39 +61,105 @@ class Entry:
             raise self.error(f"{key} is {value!r}, not a text")
         return value
 
+    def label(self, key: str) -> str:
+        """Return an id or a class as text, "" if it is missing or null."""
+        value = self.fields.get(key)
+        if value is None:
+            return ""
+        if isinstance(value, bool) or not isinstance(value, int | float | str):
+            raise self.error(f"{key} is {value!r}, not a name or a number")
+        return str(value)
+
     def _number(self, key: str, value: Any) -> float:
+        if value is None:
+            return math.nan
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise self.error(f"{key} is {value!r}, not a number")
-        if not math.isfinite(value):
-            raise self.error(f"{key} is {value}, not finite")
-        return float(value)
+        try:
+            return float(value)
+        except OverflowError:
+            raise self.error(f"{key} is too large a number") from None
 
 
 def parse_entries(path: str | Path, text: str, key: str) -> tuple[list[Entry], dict[str, Any]]:
-    """Parse a list of objects, or the one under ``key`` of a table; also return the rest of it."""
+    """Parse a list of objects, or the one under ``key`` of a table; also return the rest of it.
+
+    Only the list at the top of the table counts, not one within other values.
+    """
     decoder = json.JSONDecoder()
     try:
-        start = SPACE.match(text).end()  # type: ignore[union-attr]
-        rest: Any = {}
-        if text[start] == "{":
-            rest = json.loads(text)
-            if not isinstance(rest.get(key), list):
-                raise FileError(path, f"no list {key} (it has: {', '.join(rest)})")
-            start = re.search(rf'"{key}"\s*:\s*(?=\[)', text).end()  # type: ignore[union-attr]
-        if text[start] != "[":
+        start = _skip(text, 0)
+        if text[start] == "[":
+            entries, end = _scan(path, text, start + 1, decoder)
+            rest: dict[str, Any] = {}
+        elif text[start] == "{":
+            entries, rest, end = _scan_table(path, text, start + 1, key, decoder)
+        else:
             raise FileError(path, "is neither a list nor a table of one")
-        return _scan(path, text, start + 1, decoder), rest
+        if _skip(text, end) != len(text):
+            raise json.JSONDecodeError("text after its end", text, _skip(text, end))
+        return entries, rest
     except json.JSONDecodeError as error:
         raise FileError(path, f"not JSON: {error.msg}", error.lineno) from None
     except RecursionError:
         raise FileError(path, "nested too deeply") from None
 
 
-def _scan(path: str | Path, text: str, at: int, decoder: json.JSONDecoder) -> list[Entry]:
-    """Decode one item after the other, counting lines."""
+def parse_lines(path: str | Path, text: str) -> list[Entry]:
+    """Parse a file with one object in each line (JSON lines)."""
     entries: list[Entry] = []
-    line, counted = 1, 0
-    at = SPACE.match(text, at).end()  # type: ignore[union-attr]
+    for number, line in enumerate(text.split("\n"), start=1):
+        if not line.strip():
+            continue
+        try:
+            fields = json.loads(line)
+        except json.JSONDecodeError as error:
+            raise FileError(path, f"not JSON: {error.msg}", number) from None
+        except RecursionError:
+            raise FileError(path, "nested too deeply", number) from None
+        if not isinstance(fields, dict):
+            raise FileError(path, "is no table of named values", number)
+        entries.append(Entry(path, len(entries), number, fields))
+    return entries
+
+
+def _skip(text: str, at: int) -> int:
+    """Return the place of the next character that is not a space."""
+    return SPACE.match(text, at).end()  # type: ignore[union-attr]
+
+
+def _scan_table(
+    path: str | Path, text: str, at: int, key: str, decoder: json.JSONDecoder
+) -> tuple[list[Entry], dict[str, Any], int]:
+    """Decode a table value by value, the list under ``key`` item by item."""
+    entries: list[Entry] | None = None
+    rest: dict[str, Any] = {}
+    at = _skip(text, at)
+    while text[at : at + 1] != "}":
+        name, at = decoder.raw_decode(text, at)
+        at = _skip(text, at)
+        if not isinstance(name, str) or text[at : at + 1] != ":":
+            raise json.JSONDecodeError("expected a name and ':'", text, at)
+        at = _skip(text, at + 1)
+        if name == key and text[at : at + 1] == "[":
+            if entries is not None:
+                raise FileError(path, f"has two lists {key}", text.count("\n", 0, at) + 1)
+            entries, at = _scan(path, text, at + 1, decoder)
+        else:
+            rest[name], at = decoder.raw_decode(text, at)
+        at = _next(text, at, "}")
+    if entries is None:
+        raise FileError(path, f"no list {key} (it has: {', '.join(rest)})")
+    return entries, rest, at + 1
+
+
+def _scan(
+    path: str | Path, text: str, at: int, decoder: json.JSONDecoder
+) -> tuple[list[Entry], int]:
+    """Decode one item of a list after the other, counting lines; also return the list's end."""
+    entries: list[Entry] = []
+    line, counted = 1 + text.count("\n", 0, at), at
+    at = _skip(text, at)
     while text[at : at + 1] != "]":
         line += text.count("\n", counted, at)
         counted = at
@@ -101,9 +167,15 @@ def _scan(path: str | Path, text: str, at: int, decoder: json.JSONDecoder) -> li
         if not isinstance(fields, dict):
             raise FileError(path, f"entry {len(entries)} is no table of named values", line)
         entries.append(Entry(path, len(entries), line, fields))
-        at = SPACE.match(text, at).end()  # type: ignore[union-attr]
-        if text[at : at + 1] == ",":
-            at = SPACE.match(text, at + 1).end()  # type: ignore[union-attr]
-        elif text[at : at + 1] != "]":
-            raise json.JSONDecodeError("expected ',' or ']'", text, at)
-    return entries
+        at = _next(text, at, "]")
+    return entries, at + 1
+
+
+def _next(text: str, at: int, end: str) -> int:
+    """Return the place of the next item after a comma, or of the end."""
+    at = _skip(text, at)
+    if text[at : at + 1] == ",":
+        return _skip(text, at + 1)
+    if text[at : at + 1] != end:
+        raise json.JSONDecodeError(f"expected ',' or '{end}'", text, at)
+    return at

@@ -1,73 +1,120 @@
 """Detections from ROS bags: vision_msgs/Detection2DArray.
 
 A box has its center and size in pixels. Whole numbers are assumed to be pixel centers counted from
-0, as in CameraInfo, because vision_msgs does not specify it. A rotated box is refused. The best
-hypothesis gives class and score. A class that is a number is the class id; other classes are
-numbered in the order of their names. ``id`` (vision_msgs 4) or ``tracking_id`` is the track; values
-that are not numbers are numbered in the order in which they occur. A frame is a message, and its
-time is that of the array's header.
+0, as in CameraInfo, because vision_msgs does not specify it. A rotated box is bad. The best
+hypothesis gives class and score. Classes and ids (``id`` of vision_msgs 4, ``tracking_id``) are
+names, see `dqslam.io.labels`. Detections without a hypothesis are left out, unless none has one:
+then all are of the class "object". A frame is a message, and its time is that of the array's
+header, or, where that is 0, that of its detections. A message that is repeated is left out.
 """
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from dqslam.io.detections.table import NO_TRACK, DetectionTable
+from dqslam.io.detections.records import Records, make_table
+from dqslam.io.detections.table import NO_SCORE, DetectionTable
 from dqslam.io.files import FileError
-from dqslam.io.formats import Format, Progress, no_progress
-from dqslam.io.frames import FrameTimes
+from dqslam.io.formats import Format, ReadContext
 from dqslam.io.rosbag import LOOKS, NAME, looks_like_bag, messages, stamp_seconds
 
 KIND = "vision_msgs/msg/Detection2DArray"
 COLUMNS = ("stamp", "bbox", "class_id", "score", "id")
+NO_TURN = 1e-4  #: rad; a smaller angle moves no edge by a tenth of a pixel
 
 
-def read_detection_arrays(
-    path: str | Path,
-    *,
-    width: int | None = None,
-    height: int | None = None,
-    frames: FrameTimes | None = None,
-    classes: dict[int, str] | None = None,
-    topic: str | None = None,
-    progress: Progress = no_progress,
-) -> DetectionTable:
-    """Read boxes, unchecked; names of ``classes`` override the bag's."""
-    frame, line, times, boxes, scores, labels, tracks = [], [], [], [], [], [], []
-    for number, (where, message) in enumerate(messages(path, KIND, topic, progress)):
-        for detection in message.detections:
-            if not len(detection.results):
-                raise FileError(path, f"{where}: a detection without a class")
-            label, score = max(
-                (_hypothesis(result) for result in detection.results), key=lambda best: best[1]
-            )
+def read_detection_arrays(path: str | Path, context: ReadContext) -> DetectionTable:
+    """Read boxes, unchecked."""
+    frame, line, times, boxes, best, tracks = [], [], [], [], [], []
+    turned: dict[int, tuple[str, float]] = {}
+    seen: dict[float, list[Any]] = {}
+    repeated, count = [], 0
+    for number, (where, message) in enumerate(
+        messages(path, KIND, context.topic, context.progress)
+    ):
+        count += 1
+        if not len(message.detections):
+            continue  # an image without boxes, and perhaps without a time
+        time = _time(path, where, message)
+        content = [_content(detection) for detection in message.detections]
+        if time in seen:
+            if content != seen[time]:
+                raise FileError(path, f"{where}: other boxes at a time that was before, {time!r}")
+            repeated.append((number, where, time))
+            continue
+        seen[time] = content
+        for box, theta, hypothesis, track in content:
+            if abs(math.remainder(theta, math.pi)) > NO_TURN:
+                turned[len(boxes)] = (where, theta)
             frame.append(number)
             line.append(number + 1)
-            times.append(stamp_seconds(message))
-            boxes.append(_box(path, where, detection.bbox))
-            scores.append(score)
-            labels.append(label)
-            tracks.append(str(getattr(detection, "id", getattr(detection, "tracking_id", ""))))
+            times.append(time)
+            boxes.append(box)
+            best.append(hypothesis)
+            tracks.append(track)
+    context.notes.leave_out(
+        path,
+        "messages",
+        "repeated",
+        range(len(repeated)),
+        count,
+        lambda row: FileError(path, f"{repeated[row][1]} repeats the time {repeated[row][2]!r}"),
+    )
     if not boxes:
         raise FileError(path, f"holds no boxes in {KIND}")
-    class_id = _numbered(labels, sorted(set(labels)))
-    named = zip(class_id.tolist(), labels, strict=True)
-    return DetectionTable(
-        path=str(path),
-        columns=COLUMNS,
-        line=np.array(line),
-        frame=np.array(frame, dtype=np.int64),
-        timestamp=np.array(times),
-        box=np.array(boxes),
-        score=np.array(scores, dtype=float),
-        class_id=class_id,
-        class_name=tuple((classes or {}).get(number, name) for number, name in named),
-        track_id=_numbered(tracks, list(dict.fromkeys(tracks))) if any(tracks) else None,
+    bad = sorted(turned)
+    context.notes.leave_out(
+        path,
+        "boxes",
+        "turned",
+        bad,
+        len(boxes),
+        lambda row: FileError(path, f"{turned[row][0]}: box is turned by {turned[row][1]:g} rad"),
     )
+    classified = any(best)
+    kept = [row for row in range(len(boxes)) if row not in turned and (best[row] or not classified)]
+    nameless = sum(not one for one in best) if classified else 0
+    context.notes.skip(path, "boxes", "detections without a class", nameless, len(boxes))
+    if not classified:
+        context.notes.doubt(path, 'no detection has a class: all are taken for the class "object"')
+    records = Records(
+        columns=COLUMNS,
+        line=[line[row] for row in kept],
+        box=np.array([boxes[row] for row in kept]).reshape(-1, 4),
+        frame=np.array([frame[row] for row in kept], dtype=np.int64),
+        time=np.array([times[row] for row in kept]),
+        score=np.array([best[row][1] if best[row] else NO_SCORE for row in kept]),
+        class_id=[best[row][0] for row in kept] if classified else None,
+        track_id=[tracks[row] for row in kept] if any(tracks) else None,
+    )
+    return make_table(path, NAME, records, context)
+
+
+def _time(path: str | Path, where: str, message: Any) -> float:
+    """Return the time of an array in seconds."""
+    time = stamp_seconds(message)
+    if time != 0:
+        return time
+    own = {stamp_seconds(detection) for detection in message.detections}
+    if len(own) > 1:
+        raise FileError(path, f"{where}: no time, and its detections have {len(own)} times")
+    return own.pop()
+
+
+def _content(detection: Any) -> tuple[list[float], float, tuple[str, float] | None, str]:
+    """Return corners [px], angle [rad], the best class with its score, and the id."""
+    bbox = detection.bbox
+    center = getattr(bbox.center, "position", bbox.center)
+    x, y, w, h = center.x, center.y, bbox.size_x, bbox.size_y
+    corners = [x - w / 2, y - h / 2, x + w / 2, y + h / 2]
+    hypotheses = [_hypothesis(result) for result in detection.results]
+    best = max(hypotheses, key=lambda one: one[1]) if hypotheses else None
+    track = str(getattr(detection, "id", getattr(detection, "tracking_id", "")))
+    return corners, float(bbox.center.theta), best, track
 
 
 def _hypothesis(result: Any) -> tuple[str, float]:
@@ -77,24 +124,4 @@ def _hypothesis(result: Any) -> tuple[str, float]:
     return str(inner.id if label is None else label), float(inner.score)
 
 
-def _box(path: str | Path, where: str, bbox: Any) -> list[float]:
-    center = getattr(bbox.center, "position", bbox.center)
-    x, y, w, h = center.x, center.y, bbox.size_x, bbox.size_y
-    if not np.isfinite([x, y, w, h]).all():
-        raise FileError(path, f"{where}: box is not finite")
-    if bbox.center.theta:
-        raise FileError(path, f"{where}: box is turned by {bbox.center.theta:g} rad")
-    return [x - w / 2, y - h / 2, x + w / 2, y + h / 2]
-
-
-def _numbered(labels: list[str], order: list[str]) -> NDArray[np.int64]:
-    """Turn labels into whole numbers: their value, or their place in the order; "" means none."""
-    real = [label for label in order if label]
-    if all(label.isdecimal() or label == str(NO_TRACK) for label in real):
-        number = {label: int(label) for label in real}
-    else:
-        number = {label: i for i, label in enumerate(real)}
-    return np.array([number.get(label, NO_TRACK) for label in labels], dtype=np.int64)
-
-
-ARRAYS = Format(NAME, LOOKS, looks_like_bag, read_detection_arrays, tells_share=True)
+ARRAYS = Format(NAME, LOOKS, looks_like_bag, read_detection_arrays)

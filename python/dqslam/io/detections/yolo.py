@@ -1,30 +1,32 @@
 """Detections as YOLO text: one file per image, one line ``class cx cy w h [score [id]]`` per box.
 
 Center and size are shares of the image's width and height, which must be known. They count from the
-corner of the image, so half a pixel is subtracted. The frame comes from the name of the file, see
-`dqslam.io.frames.frame_of`. Names of classes are those of ``classes``, else of ``classes.txt`` (one
-line per class, from 0), else of ``names`` in ``data.yaml``, else the number. Times are those of the
-frames, or of ``frames.csv`` in the folder, which we write.
+corner of the image, so half a pixel is subtracted. Ultralytics also writes ``class cx cy w h id``
+(tracks without scores), outlines ``class x1 y1 x2 y2 x3 y3 ... [score [id]]`` (segments, and turned
+boxes with 4 corners) and key points ``class cx cy w h x y [visible] ... [score [id]]``; outlines
+become the box around them. All lines of a folder have the same form, which all of them tell
+together: see `yolo_lines`.
+
+The frame comes from the names of all files, see `dqslam.io.image_names`. Names of classes are those
+of ``classes``, else of ``classes.txt`` (one line per class, from 0), else of ``names`` in
+``data.yaml``, else the number. Times are those of the frames, or of ``frames.csv`` in the folder,
+which we write. A file without a box is an image without boxes.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from dqslam.io.detections.table import NO_SCORE, NO_TRACK, DetectionTable
-from dqslam.io.files import (
-    FileError,
-    parse_integers,
-    parse_numbers,
-    read_rows,
-    read_text,
-    whole_folder,
-    write_text,
-)
-from dqslam.io.formats import Format, Look, Progress, no_progress
-from dqslam.io.frames import FrameTimes, frame_of, frame_table, read_frame_times
+from dqslam.io.detections.records import Records, make_table
+from dqslam.io.detections.table import DetectionTable
+from dqslam.io.detections.yolo_lines import YoloLine, split_lines
+from dqslam.io.files import FileError, read_text, whole_folder, write_text
+from dqslam.io.formats import Format, Look, ReadContext
+from dqslam.io.frames import frame_table, read_frame_times
+from dqslam.io.image_names import have_times
 from dqslam.io.yaml import parse_yaml
 
 FIELDS = ("class", "cx", "cy", "w", "h", "score", "id")
@@ -33,64 +35,33 @@ CLASSES, DATA, TIMES = "classes.txt", "data.yaml", "frames.csv"
 LARGEST_CLASS = 9999  #: limits classes.txt, which has a line for every number up to the largest
 
 
-def read_yolo(
-    path: str | Path,
-    *,
-    width: int | None = None,
-    height: int | None = None,
-    frames: FrameTimes | None = None,
-    classes: dict[int, str] | None = None,
-    progress: Progress = no_progress,
-) -> DetectionTable:
-    """Read boxes, unchecked, in images of width x height px."""
-    if width is None or height is None:
-        raise FileError(path, "yolo's boxes are shares of the image: give its size with --camera")
+def read_yolo(path: str | Path, context: ReadContext) -> DetectionTable:
+    """Read boxes, unchecked."""
+    if context.size is None:
+        message = "yolo's boxes are shares of the image: give its size with --camera"
+        raise FileError(path, message)
     folder = Path(path)
     if not folder.is_dir():
         raise FileError(path, "is no folder of .txt files")
-    if frames is None and (folder / TIMES).is_file():
-        frames = read_frame_times(folder / TIMES)
-    if frames is None:
-        message = "yolo has no times: give them with --frame-times FILE or --frame-rate HZ"
-        raise FileError(path, message)
-    rows, lines, files, frame = _read_rows(folder, frames, progress)
-    columns = dict(zip(FIELDS, zip(*rows, strict=True), strict=True))
-
-    def numbers(name: str) -> list[float]:
-        # Files are checked one after the other, so that an error names the right one.
-        return [
-            float(parse_numbers(file, name, [cell], [line])[0])
-            for file, cell, line in zip(files, columns[name], lines, strict=True)
-        ]
-
-    def integers(name: str) -> list[int]:
-        return [
-            int(parse_integers(file, name, [cell], [line])[0])
-            for file, cell, line in zip(files, columns[name], lines, strict=True)
-        ]
-
-    cx, cy, w, h = (np.array(numbers(name)) for name in FIELDS[1:5])
-    share = np.column_stack([cx - w / 2, cy - h / 2, cx + w / 2, cy + h / 2])
-    class_id = integers("class")
-    names = _names(folder) | (classes or {})
-    times = [
-        frames.at(file, np.array([number]), [line])[0]
-        for file, number, line in zip(files, frame, lines, strict=True)
-    ]
-    track = np.array(integers("id"), dtype=np.int64)
-    return DetectionTable(
-        path=str(path),
+    if context.frames is None and (folder / TIMES).is_file():
+        context = replace(context, frames=read_frame_times(folder / TIMES))
+    lines = _lines(folder, context)
+    if not lines:
+        raise FileError(folder, "holds no boxes")
+    boxes = split_lines(lines, context.notes, folder)
+    records = Records(
         columns=FIELDS,
-        line=np.array(lines),
-        frame=np.array(frame, dtype=np.int64),
-        timestamp=np.array(times),
-        box=share * np.tile([width, height], 2) - CORNER,
-        score=np.array(numbers("score")),
-        class_id=np.array(class_id, dtype=np.int64),
-        class_name=tuple(names.get(number, str(number)) for number in class_id),
-        track_id=track if (track != NO_TRACK).any() else None,
-        files=tuple(map(str, files)),
+        line=[line.number for line in lines],
+        box=boxes.share * np.tile(context.size, 2) - CORNER,
+        image=[line.file.name for line in lines],
+        all_images=[file.name for file in _box_files(folder)],
+        score=boxes.score,
+        class_id=[line.cells[0] for line in lines],
+        class_names={str(number): name for number, name in _names(folder).items()},
+        track_id=boxes.track_id,
+        files=[str(line.file) for line in lines],
     )
+    return make_table(path, "yolo", records, context)
 
 
 def write_yolo(
@@ -118,31 +89,24 @@ def write_yolo(
             write_text(folder / name, lines)
 
 
-def _read_rows(
-    folder: Path, frames: FrameTimes, progress: Progress
-) -> tuple[list[list[str]], list[int], list[Path], list[int]]:
-    """Read all boxes as seven cells, with the line, the file and the frame of each."""
-    rows: list[list[str]] = []
-    lines, files, numbers = [], [], []
-    box_files = _box_files(folder)
-    for done, file in enumerate(box_files, start=1):
-        progress(done / len(box_files))
-        if not file.stat().st_size:
-            continue  # an image without boxes has an empty file
-        number = frame_of(file.name, frames)
-        if number is None:
-            raise FileError(file, "its name is no number of a frame, and in no --frame-times")
-        for row, line in zip(*read_rows(file), strict=True):
-            cells = row.split()
-            if not 5 <= len(cells) <= len(FIELDS):
-                raise FileError(file, f"{len(cells)} fields, not 5 to 7: {' '.join(FIELDS)}", line)
-            rows.append(cells + [str(NO_SCORE), str(NO_TRACK)][len(cells) - 5 :])
-            lines.append(line)
-            files.append(file)
-            numbers.append(number)
-    if not rows:
-        raise FileError(folder, "holds no boxes")
-    return rows, lines, files, numbers
+def _lines(folder: Path, context: ReadContext) -> list[YoloLine]:
+    """Read the lines of all files; a file of blanks is an image without boxes."""
+    lines: list[YoloLine] = []
+    files = _box_files(folder)
+    for done, file in enumerate(files, start=1):
+        context.progress(done / len(files))
+        if file.stat().st_size == 0:
+            continue
+        try:
+            text = file.read_text(encoding="utf-8-sig")
+        except UnicodeDecodeError:
+            raise FileError(file, "is not a text file (UTF-8)") from None
+        lines += [
+            YoloLine(file, number, tuple(row.split()))
+            for number, row in enumerate(text.split("\n"), start=1)
+            if row.strip() and not row.lstrip().startswith("#")
+        ]
+    return lines
 
 
 def _box_files(folder: Path) -> list[Path]:
@@ -172,6 +136,10 @@ def _looks(look: Look) -> bool:
     return look.path.is_dir() and bool(_box_files(look.path))
 
 
+def _has_times(path: Path) -> bool:
+    return (path / TIMES).is_file() or have_times([file.name for file in _box_files(path)])
+
+
 YOLO = Format(
     "yolo",
     "a folder of .txt files",
@@ -179,7 +147,6 @@ YOLO = Format(
     read_yolo,
     write_yolo,
     needs_times=False,
-    has_times=lambda path: (path / TIMES).is_file(),
+    has_times=_has_times,
     endings=("",),
-    tells_share=True,
 )

@@ -3,25 +3,27 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from dqslam import _core
-from dqslam.io.formats import Progress, choose_format, no_progress
+from dqslam.io.formats import Progress, ReadContext, choose_format, guarded, no_progress
 from dqslam.io.frames import FrameTimes
-from dqslam.io.rosbag import topic_option
+from dqslam.io.notes import Notes
+from dqslam.io.rosbag import check_topic
+from dqslam.io.trajectory.colmap import COLMAP_IMAGES
 from dqslam.io.trajectory.euroc import EUROC
-from dqslam.io.trajectory.kitti import KITTI
-from dqslam.io.trajectory.rosbag import ODOMETRY
+from dqslam.io.trajectory.kitti import KITTI, KITTI_360
+from dqslam.io.trajectory.rosbag import BAG_TRAJECTORY
 from dqslam.io.trajectory.table import Trajectory as Trajectory
 from dqslam.io.trajectory.tum import TUM
 from dqslam.io.trajectory.tum import write_tum as write_trajectory
 
 __all__ = ["TRAJECTORY_FORMATS", "Trajectory", "read_trajectory", "write_trajectory"]
 
-TRAJECTORY_FORMATS = (ODOMETRY, TUM, KITTI, EUROC)
+# A file is of the first of these that it looks like.
+TRAJECTORY_FORMATS = (BAG_TRAJECTORY, EUROC, TUM, KITTI, KITTI_360, COLMAP_IMAGES)
 
 
 def read_trajectory(
@@ -33,13 +35,14 @@ def read_trajectory(
     repeated_times: bool = False,
     topic: str | None = None,
     progress: Progress = no_progress,
+    notes: Notes | None = None,
 ) -> Trajectory:
     """Read a trajectory.
 
     Parameters
     ----------
     path
-        A file, or the folder of a bag.
+        A file, the folder of a bag, or - for standard input.
     format
         One of TRAJECTORY_FORMATS; by default it is recognized from the file.
     frames
@@ -47,18 +50,35 @@ def read_trajectory(
     body_from_camera
         Pose (7,) of the camera in the body, m and x y z w, for the trajectory of a body.
     repeated_times
-        Whether to leave out a repeated time instead of refusing it. Motion capture at a high rate
+        Whether to leave out any repeated time instead of refusing it. Motion capture at a high rate
         has a few, because times are rounded.
     topic
         Topic of a bag that has several.
     progress
         Called with the share of a bag or a folder that has been read.
+    notes
+        Collects what is left out and what is doubtful, and says how many bad poses may be left out;
+        by default these are warnings of Python, of the category ``InputWarning``.
+
+    Raises
+    ------
+    FileError
+        If the file is missing, in no known format, or wrong.
     """
     chosen = choose_format(path, format, TRAJECTORY_FORMATS, "trajectory")
-    options: dict[str, Any] = dict(topic_option(chosen.name, topic))
-    if chosen.tells_share:
-        options["progress"] = progress
-    trajectory = chosen.read(path, frames=frames, repeated_times=repeated_times, **options)
+    check_topic(chosen.name, topic)
+    own = Notes() if notes is None else notes
+    context = ReadContext(
+        frames=frames,
+        repeated_times=repeated_times,
+        topic=topic,
+        progress=progress,
+        notes=own,
+        has_mount=body_from_camera is not None,
+    )
+    trajectory: Trajectory = guarded(path, chosen.name, chosen.read, path, context)
+    if notes is None:
+        own.warn()
     if body_from_camera is None:
         return trajectory
     mount = np.tile(np.asarray(body_from_camera, dtype=float), (len(trajectory.timestamps), 1))

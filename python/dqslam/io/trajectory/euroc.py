@@ -2,7 +2,8 @@
 
 Time is a whole number of nanoseconds, the quaternion has w first, and the pose is world_from_body,
 where EuRoC's body is the IMU (``R_S``: sensor in reference frame). The camera is assumed to be the
-body unless ``body_from_camera`` is given to read_trajectory. The header is a comment.
+body unless ``body_from_camera`` is given to read_trajectory. The header is a comment; if it names
+all these columns, it tells their order and the unit of time.
 Seconds as floats hold today's time to 0.24 microseconds, so nanoseconds are not kept exactly.
 """
 
@@ -15,21 +16,24 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dqslam.io.files import FileError, read_rows, write_text
-from dqslam.io.formats import Format, Look
-from dqslam.io.frames import FrameTimes
+from dqslam.io.formats import Format, Look, ReadContext, look_at
+from dqslam.io.trajectory.columns import read_columns
+from dqslam.io.trajectory.header import find_header
 from dqslam.io.trajectory.table import Trajectory, make_trajectory, parse_columns
 
 FIELDS = ("p_x", "p_y", "p_z", "q_w", "q_x", "q_y", "q_z")
 HEADER = "#timestamp [ns]," + ",".join(FIELDS) + "\n"
 NANO = Decimal(10) ** 9
 SECOND = 10**9  #: a smaller number is not a time in nanoseconds, but the number of a frame
+LONGEST = 20  #: more digits are no time
 COMMONEST = (8, 17)  #: columns: the pose alone, and with velocity and biases
 
 
-def read_euroc(
-    path: str | Path, *, frames: FrameTimes | None = None, repeated_times: bool = False
-) -> Trajectory:
-    """Read an EuRoC trajectory of a body; ``frames`` are not used, because it has times."""
+def read_euroc(path: str | Path, context: ReadContext) -> Trajectory:
+    """Read an EuRoC trajectory of a body; it has times, so those of frames are not used."""
+    look = look_at(path)
+    if find_header(look.comments, look.first) is not None:
+        return read_columns(path, context)
     rows, lines = read_rows(path)
     cells = [[cell.strip() for cell in row.split(",")] for row in rows]
     for row, line in zip(cells, lines, strict=True):
@@ -39,7 +43,7 @@ def read_euroc(
     times = np.array([_seconds(path, row[0], line) for row, line in zip(cells, lines, strict=True)])
     table = parse_columns(path, FIELDS, [row[1:8] for row in cells], lines)
     poses = table[:, [0, 1, 2, 4, 5, 6, 3]]
-    return make_trajectory(path, times, poses, lines, repeated_times=repeated_times)
+    return make_trajectory(path, times, poses, lines, context)
 
 
 def write_euroc(path: str | Path, timestamps: ArrayLike, world_from_camera: ArrayLike) -> None:
@@ -57,14 +61,15 @@ def write_euroc(path: str | Path, timestamps: ArrayLike, world_from_camera: Arra
 
 def _seconds(path: str | Path, cell: str, line: int) -> float:
     # A float of nanoseconds would lose 7 bits before it is divided.
-    if not cell.lstrip("-").isdecimal():
+    if not cell.lstrip("-").isdecimal() or len(cell) > LONGEST:
         raise FileError(path, f"time is {cell!r}, not a whole number of nanoseconds", line)
     return float(Decimal(cell) / NANO)
 
 
 def _looks(look: Look) -> bool:
     cells = [cell.strip() for cell in look.first.split(",")]
-    return len(cells) in COMMONEST and cells[0].isdecimal() and int(cells[0]) >= SECOND
+    is_time = cells[0].isdecimal() and len(cells[0]) < LONGEST and int(cells[0]) >= SECOND
+    return len(cells) in COMMONEST and is_time
 
 
 EUROC = Format(

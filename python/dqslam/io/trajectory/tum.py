@@ -1,7 +1,8 @@
 """TUM trajectories: one line ``t tx ty tz qx qy qz qw`` for each pose.
 
 The pose is world_from_camera: meters, unit quaternion x y z w, camera x right, y down, z forward.
-Time is in seconds and strictly increasing. Lines that start with # are comments.
+Time is in seconds and strictly increasing. Lines that start with # are comments; if one of them, or
+the first row, names the columns, it tells their order and more: see `columns`.
 """
 
 from __future__ import annotations
@@ -11,25 +12,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dqslam.io.files import FileError, read_rows, write_text
+from dqslam.io.files import write_text
 from dqslam.io.formats import Format, Look
-from dqslam.io.frames import FrameTimes
-from dqslam.io.trajectory.table import Trajectory, make_trajectory, parse_columns
+from dqslam.io.trajectory.columns import WITH_ID, read_columns, split_row
+from dqslam.io.trajectory.header import FIELDS, find_header
 
-FIELDS = ("t", "tx", "ty", "tz", "qx", "qy", "qz", "qw")
-
-
-def read_tum(
-    path: str | Path, *, frames: FrameTimes | None = None, repeated_times: bool = False
-) -> Trajectory:
-    """Read a TUM trajectory; ``frames`` are not used, because it has times."""
-    rows, lines = read_rows(path)
-    fields = [row.split() for row in rows]
-    for row, line in zip(fields, lines, strict=True):
-        if len(row) != len(FIELDS):
-            raise FileError(path, f"{len(row)} fields, not 8: {' '.join(FIELDS)}", line)
-    table = parse_columns(path, FIELDS, fields, lines)
-    return make_trajectory(path, table[:, 0], table[:, 1:], lines, repeated_times=repeated_times)
+LONGEST = 2.0  #: of four numbers that may be a quaternion; width and height of boxes are longer
 
 
 def write_tum(path: str | Path, timestamps: ArrayLike, world_from_camera: ArrayLike) -> None:
@@ -46,16 +34,25 @@ def write_tum(path: str | Path, timestamps: ArrayLike, world_from_camera: ArrayL
 
 
 def _looks(look: Look) -> bool:
-    fields = look.first.split()
-    # A camera of COLMAP may have 8 fields as well; its second field is the model.
-    return "," not in look.first and len(fields) == len(FIELDS) and not fields[1][0].isupper()
+    if find_header(look.comments, look.first) is not None:
+        return True
+    cells = split_row(look.first)
+    if len(cells) not in (len(FIELDS), WITH_ID):
+        return False
+    try:
+        values = [float(cell) for cell in cells]
+    except ValueError:
+        return False
+    # Boxes of MOT have as many numbers, and the first is a whole one as well.
+    quaternion = np.linalg.norm(values[4:8])
+    return not quaternion > LONGEST and (len(cells) == len(FIELDS) or values[8] == int(values[8]))
 
 
 TUM = Format(
     "tum",
-    "8 fields a line, t tx ty tz qx qy qz qw",
+    "8 fields a line, t tx ty tz qx qy qz qw, or a header that names them",
     _looks,
-    read_tum,
+    read_columns,
     write_tum,
     endings=(".txt", ".tum"),
 )

@@ -1,0 +1,100 @@
+"""Headers of trajectories: the names of columns, in a comment or in the first row.
+
+A header that names the four parts of a quaternion is believed: it says which column is which, and
+units in brackets. Any other comment is prose.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from dqslam.io.files import FileError
+
+FIELDS = ("t", "tx", "ty", "tz", "qx", "qy", "qz", "qw")
+# In lower case, without what is in brackets, "_" for all but letters and digits.
+SPELLINGS = {
+    "t": ("t", "time", "timestamp", "stamp", "timestamps", "timestamp_s", "time_s", "sec"),
+    "qx": ("qx", "q_x", "q_rs_x", "rot_x", "quat_x", "orientation_x", "pose_orientation_x"),
+    "tx": ("tx", "t_x", "x", "px", "p_x", "p_rs_r_x", "pos_x", "position_x", "pose_position_x"),
+}
+UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "m": 1.0, "cm": 1e-2, "mm": 1e-3, "": 1.0}
+# Names of ends of times, which are not in brackets.
+TIME_UNITS = {"_ns": "ns", "_us": "us", "_ms": "ms", "_nsec": "ns"}
+QUATERNION = {"qx", "qy", "qz", "qw"}
+
+
+@dataclass(frozen=True)
+class Header:
+    """Which column has which of FIELDS, and what its unit is in s or m."""
+
+    columns: dict[str, int]
+    units: dict[str, str]
+    count: int  #: number of columns
+    others: tuple[str, ...]  #: names that mean nothing here
+
+
+def _meanings() -> dict[str, str]:
+    found = {name: "t" for name in SPELLINGS["t"]}
+    for kind, axes in (("qx", "xyzw"), ("tx", "xyz")):
+        for axis in axes:
+            for name in SPELLINGS[kind]:
+                found[re.sub("x$", axis, name)] = kind[0] + axis
+    return found
+
+
+MEANING = _meanings()
+
+
+def parse_header(text: str) -> Header | None:
+    """Return the header that a comment or row is, or None if it is none.
+
+    It may be separated by commas, semicolons, or spaces.
+    """
+    text = text.strip().lstrip("#%/").strip()
+    separator = next((one for one in (",", ";", "\t") if one in text), None)
+    # A unit may be apart from its name: "p_RS_R_x [m]".
+    names = text.split(separator) if separator else re.sub(r"\s+[\[(]", "[", text).split()
+    columns: dict[str, int] = {}
+    units: dict[str, str] = {}
+    others = []
+    for place, name in enumerate(names):
+        bare = re.sub(r"[^a-z0-9]+", "_", re.sub(r"[\[(].*", "", name.strip().lower())).strip("_")
+        unit = re.search(r"[\[(]\s*([a-z]*)\s*[\])]", name.strip().lower())
+        given = unit[1] if unit else ""
+        for ending, ending_unit in TIME_UNITS.items():
+            if bare.endswith(ending) and bare.removesuffix(ending) in SPELLINGS["t"]:
+                bare, given = bare.removesuffix(ending), ending_unit
+        meaning = MEANING.get(bare)
+        if meaning is None or meaning in columns:
+            others.append(name.strip())
+        else:
+            columns[meaning], units[meaning] = place, given
+    if len(QUATERNION & set(columns)) < len(QUATERNION):
+        return None
+    return Header(columns, units, len(names), tuple(others))
+
+
+def find_header(comments: Sequence[str], first: str) -> Header | None:
+    """Return the header in the first row, or else in the last comment that is one."""
+    for text in (first, *reversed(comments)):
+        header = parse_header(text)
+        if header is not None:
+            return header
+    return None
+
+
+def unit_of(path: str | Path, header: Header, name: str) -> float:
+    """Return the unit of a column in s or m.
+
+    Raises
+    ------
+    FileError
+        If the header names a unit that is not known.
+    """
+    unit = header.units.get(name, "")
+    if unit not in UNITS:
+        raise FileError(path, f"the header gives {name} in {unit}, not one of {', '.join(UNITS)}")
+    return UNITS[unit]
