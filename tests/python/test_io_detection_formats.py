@@ -7,6 +7,7 @@ import realdata
 from dqslam.io import (
     DETECTION_FORMATS,
     FileError,
+    InputWarning,
     frame_rate,
     read_class_names,
     read_detections,
@@ -53,20 +54,22 @@ def test_a_coco_box_of_the_whole_image(tmp_path):
 
 def test_a_coco_dataset_names_classes_and_images(tmp_path):
     dataset = {
-        "images": [{"id": 4, "file_name": "rgb/1.500.png"}],
+        "images": [{"id": 40, "file_name": "rgb/1.500.png"}],
         "categories": [{"id": 3, "name": "cup"}],
-        "annotations": [ENTRY],
+        "annotations": [ENTRY | {"image_id": 40}],
     }
     path = write(tmp_path, "a.json", dataset)
-    table = read(path)
-    assert (table.class_name[0], table.frame[0]) == ("cup", 4)
+    table = read(path, frames=None)  # the name is a time
+    assert (table.class_name[0], table.frame[0], table.timestamp[0]) == ("cup", 0, 1.5)
+    with pytest.warns(InputWarning, match="names of images are times: a rate of 10 Hz is not used"):
+        assert read(path).timestamp[0] == 1.5
     times = read_frame_times(write(tmp_path, "rgb.txt", "1.4 rgb/1.400.png\n1.5 rgb/1.500.png\n"))
     table = read(path, frames=times)
     assert (table.frame[0], table.timestamp[0]) == (1, 1.5)
     named = write(tmp_path, "b.json", [ENTRY | {"image_id": "1.400"}])
     assert read(named, frames=times).timestamp[0] == 1.4
-    assert read(path, classes=read_class_names(path)).class_name == ("cup",)
-    assert read(path, classes={3: "mug"}).class_name == ("mug",)
+    assert read(path, frames=None, classes=read_class_names(path)).class_name == ("cup",)
+    assert read(path, frames=None, classes={3: "mug"}).class_name == ("mug",)
 
 
 def test_yolo_by_hand(tmp_path):
@@ -98,12 +101,17 @@ def test_yolo_names_in_data_yaml(tmp_path, names):
     ("line", "score", "class_id", "name", "track"),
     [
         ("1,-1,1,1,640,480,0.5,-1,-1,-1", 0.5, 0, "object", -1),
-        ("1,7,1,1,640,480,1,3,0.8", 1, 3, "3", 7),
+        ("1,7,1,1,640,480,0.5,3,0.8", 0.5, 3, "3", 7),
+        ("1,7,1,1,640,480", 1, 0, "object", 7),
+        ("1 7 1 1 640 480 0.5", 0.5, 0, "object", 7),
+        ("1, 7, 1, 1, 640, 480, 0.5, 2", 0.5, 2, "2", 7),
+        ("1,7,1,1,640,480,0.5,2,-1,-1", 0.5, 2, "2", 7),
+        ("1,7,1,1,640,480,0.5,1.5,-2.5,12.1", 0.5, 0, "object", 7),
         ("1,7,1,1,640,480,-1", 1, 0, "object", 7),
     ],
 )
 def test_mot_by_hand(tmp_path, line, score, class_id, name, track):
-    table = read(write(tmp_path, "det.txt", line + "\n" + line.replace("1", "3", 1)))
+    table = read(write(tmp_path, "det.txt", line + "\n" + "3" + line[1:]))
     np.testing.assert_array_equal(table.box[0], [0, 0, 639.5, 479.5])  # cut: it ends at 640
     assert table.frame.tolist() == [0, 2]
     assert table.timestamp.tolist() == [0, 0.2]
@@ -164,11 +172,19 @@ def test_the_others_come_back_to_the_digit(tmp_path, name):
         ("a.json", [ENTRY | {"bbox": [1, 2, -3, 4]}], r":2: inverted box"),
         ("a.json", [ENTRY | {"bbox": [1, 2, 3]}], r":2: entry 0: bbox is not a list of 4 numbers"),
         ("a.json", [ENTRY | {"bbox": [1, 2, 3, "a"]}], r"entry 0: bbox is 'a', not a number"),
-        ("a.json", [ENTRY | {"bbox": [1, 2, 3, float("nan")]}], r"bbox is nan, not finite"),
+        (
+            "a.json",
+            [ENTRY | {"bbox": [1, 2, 3, float("nan")]}],
+            r"a\.json:2: y2 is nan, not finite",
+        ),
         ("a.json", [ENTRY | {"score": 2}], r"a\.json:2: score is 2, not between 0 and 1"),
-        ("a.json", [ENTRY | {"category_id": 1.5}], r"category_id is 1\.5, not a whole number"),
-        ("a.json", [ENTRY, {"image_id": 4}], r"entry 1: missing category_id \(it has: image_id"),
-        ("a.json", [ENTRY | {"image_id": "shot"}], r"image_id 'shot' is no number of a frame"),
+        ("a.json", [ENTRY | {"category_id": 1.5}], r":2: class_id is 1\.5, not a whole number"),
+        ("a.json", [ENTRY, {"image_id": 4}], r"entry 1: missing bbox \(it has: image_id"),
+        (
+            "a.json",
+            [ENTRY | {"image_id": "shot"}],
+            r"a\.json:2: its name is no number of a frame; --frame-times",
+        ),
         ("a.json", [ENTRY, 3], r"entry 1 is no table of named values"),
         ("a.json", '[{"image_id": 4},\n {"image_id": }]', r"a\.json:2: not JSON"),
         ("a.json", '[{"image_id": 4}\n {"image_id": 5}]', r"a\.json:2: not JSON: expected ','"),
@@ -177,17 +193,17 @@ def test_the_others_come_back_to_the_digit(tmp_path, name):
         ("a.json", {"images": []}, r"no list annotations \(it has: images\)"),
         ("a.json", "3", r"neither a list nor a table"),
         ("a.json", {"annotations": [ENTRY], "categories": [3]}, r"categories is no list of \{id"),
-        ("a.txt", "1,-1,1,2,3,4,0.5\n1,-1,1,2,3\n", r"a\.txt:2: 5 fields, not 7 to 10 alike"),
+        ("a.txt", "1,-1,1,2,3,4,0.5\n1,-1,1,2,3\n", r"a\.txt:2: 5 fields, not 6 to 10 alike"),
         ("a.txt", "1,-1,1,2,3,4,32.5", r":1: score is 32\.5, not between"),
         ("a.txt", "1,-1,1,2,-3,4,0.5", r":1: inverted box 0, 1, -3, 5"),
         ("a.txt", "1,-1,1,2,3,4,0.5\nx,-1,1,2,3,4,0.5", r":2: frame is 'x', not a number"),
-        ("a.txt", "1,-1,1,2,3,nan,0.5", r":1: height is nan, not finite"),
+        ("a.txt", "1,-1,1,2,3,nan,0.5", r":1: y2 is nan, not finite"),
         ("a.txt", "1,-1,900,2,3,4,0.5", r":1: box 899, 1, 902, 5 is outside the image of 640"),
         ("a/7.txt", "1 0.5 0.5 0.1\n", r"a/7\.txt:1: 4 fields, not 5 to 7"),
-        ("a/7.txt", "1 0.5 0.5 0.1 0.1\n1 0.5 0.5 nan 0.1\n", r"a/7\.txt:2: w is nan, not finite"),
+        ("a/7.txt", "1 0.5 0.5 0.1 0.1\n1 0.5 0.5 nan 0.1\n", r"a/7\.txt:2: x1 is nan, not finite"),
         ("a/7.txt", "1 0.5 0.5 0.1 -0.1\n", r"a/7\.txt:1: inverted box"),
-        ("a/7.txt", "cup 0.5 0.5 0.1 0.1\n", r"a/7\.txt:1: class is 'cup', not a number"),
-        ("a/shot.txt", "1 0.5 0.5 0.1 0.1\n", r"a/shot\.txt: its name is no number of a frame"),
+        ("a/7.txt", "1 0.5 0.5 big 0.1\n", r"a/7\.txt:1: a number is 'big', not a number"),
+        ("a/shot.txt", "1 0.5 0.5 0.1 0.1\n", r"a/shot\.txt:1: its name is no number of a frame"),
         ("a/7.txt", "", r"a: holds no boxes"),
     ],
 )
@@ -208,7 +224,9 @@ def test_what_cannot_be_told_is_asked_for(tmp_path):
             FileError, match=f"{name} has no times: .*--frame-times FILE or --frame"
         ):
             read(path, frames=None)
-    with pytest.raises(ValueError, match="'tum' is none of detections formats: rosbag, yolo, coco"):
+    with pytest.raises(
+        ValueError, match="'tum' is none of detections formats: rosbag, kitti-objects"
+    ):
         read(files["mot"], format="tum")
 
 
@@ -216,7 +234,8 @@ def test_many_inverted_boxes_are_another_format(tmp_path):
     rows = [f"{i},{i},{100 + i},{100 + i},50,20,1,1,cup" for i in range(9)]
     path = write(tmp_path, "a.csv", "\n".join([CSV.split(",track_id")[0], *rows]))
     with pytest.raises(
-        FileError, match=r":2: inverted box .*\(9 of 9 boxes are so: are they x, y, "
+        FileError,
+        match=r":2: inverted box .*are they x, y, width, height\? \(9 of 9 boxes are bad, 5% may be",
     ):
         read(path)
 

@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from dqslam.io import FileError, frame_rate, read_frame_times
-from dqslam.io.frames import frame_of, image_name, write_frame_times
+from dqslam.io.frames import write_frame_times
+from dqslam.io.image_names import image_name
 
 
 def write(tmp_path, *lines):
@@ -24,8 +25,7 @@ def test_images_are_found_by_name(tmp_path):
     path = write(tmp_path, "# color images", "1.5 rgb/1.500.png", "1.7 rgb/1.700.png")
     times = read_frame_times(path)
     assert at(times, 0, 1) == [1.5, 1.7]
-    assert (frame_of("some/where/1.700.png", times), frame_of("1.700.txt", times)) == (1, 1)
-    assert frame_of("1.800", times) is None
+    assert times.names == {"1.500": 0, "1.700": 1}
 
 
 def test_csv_names_its_frames(tmp_path):
@@ -76,22 +76,6 @@ def test_a_frame_without_a_time_is_named_where_it_stands(tmp_path):
     times = read_frame_times(write(tmp_path, "0", "0.1"))
     with pytest.raises(FileError, match=r"boxes:2: .*times\.txt has no time for frame 2"):
         at(times, 1, 2)
-
-
-@pytest.mark.parametrize(
-    ("name", "frame"),
-    [
-        ("000042.png", 42),
-        ("image_02/000042.png", 42),
-        ("left_7.txt", 7),
-        ("frame-0010", 10),
-        ("shot", None),
-        ("13.25.png", None),
-        ("2²", None),
-    ],
-)
-def test_frames_by_the_numbers_that_images_are_named(name, frame):
-    assert frame_of(name, None) == frame
 
 
 def test_image_names():

@@ -173,18 +173,16 @@ def test_one_of_several_topics_is_named(tmp_path, bag):
     with pytest.raises(FileError, match=r"has topics /a, /b: name one with --topic"):
         read_trajectory(path)
     assert read_trajectory(path, topic="/b").timestamps.tolist() == [100.5]
-    with pytest.raises(FileError, match=r"no topic /c of nav_msgs/msg/Odometry \(it has: /a "):
+    with pytest.raises(FileError, match=r"no topic /c of nav_msgs/msg/Odometry, .*\(it has: /a "):
         read_trajectory(path, topic="/c")
 
 
 def test_what_is_wrong_is_named_with_its_message(tmp_path, bag):
     bad = bag.odometry(100.0, (1, float("nan"), 3), (0, 0, 0, 1))
-    none = (1.0, 1.0, 1.0, 1.0, (), "")
     flat = (1.0, 1.0, 0.0, 1.0, (("cup", 0.5),), "")
     topics = {
-        "odometry": ([bag.odometry(*ODOMETRY[0]), bad], "/odometry, message 2: pose is not finite"),
+        "odometry": ([bag.odometry(*ODOMETRY[0]), bad], "bag:2: ty is nan, not finite"),
         "backwards": ([bag.odometry(*row) for row in ODOMETRY[::-1]], "bag:2: time 100.25 goes ba"),
-        "none": ([bag.boxes(0, CUP), bag.boxes(1, none)], "message 2: a detection without a class"),
         "turned": ([bag.boxes(0, CUP, theta=0.1)], "/turned, message 1: box is turned by 0.1 rad"),
         "flat": ([bag.boxes(0, CUP), bag.boxes(1, flat)], "bag:2: empty box"),
         "empty": ([bag.boxes(0)], "holds no boxes in vision_msgs"),

@@ -42,7 +42,7 @@ def test_rounded_quaternions_become_unit(tmp_path):
     [
         ([GOOD, "1 2 3"], r"traj\.txt:2: 3 fields, not 8"),
         ([GOOD, "", "1 1 2 3 0 0 0 1 9"], r"traj\.txt:3: 9 fields, not 8"),
-        ([GOOD, "1,1,2,3,0,0,0,1"], r":2: 1 fields, not 8"),
+        ([GOOD, "1,1,2,3,0,0,0"], r":2: 7 fields, not 8"),
         (["# no", GOOD, "1 nan 2 3 0 0 0 1"], r":3: tx is nan, not finite"),
         (["1 1 2 3 0 0 0 inf"], r":1: qw is inf, not finite"),
         ([GOOD, "1 1 two 3 0 0 0 1"], r":2: ty is 'two', not a number"),

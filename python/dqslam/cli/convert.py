@@ -5,7 +5,19 @@ from typing import Annotated
 
 import typer
 
-from dqslam.cli.options import FrameRate, FrameTimesFile, given_frame_times
+from dqslam._input import refuse_shared_input
+from dqslam.cli.options import (
+    CameraInBody,
+    FirstFrame,
+    FrameRate,
+    FrameTimesFile,
+    ImageSize,
+    MaxBad,
+    Nms,
+    Topics,
+    given_frame_times,
+    given_reading,
+)
 from dqslam.cli.output import Json, Output, Quiet
 from dqslam.cli.settings import ConfigFile
 
@@ -33,37 +45,40 @@ def convert(
             help="Names of classes: COCO JSON, data.yaml, or text with one name per line."
         ),
     ] = None,
-    camera_in_body: Annotated[
-        Path | None,
-        typer.Option(
-            help="File with body_from_camera, 7, 12 or 16 numbers, if the poses are a body's."
-        ),
-    ] = None,
-    topic: Annotated[
-        list[str] | None,
-        typer.Option(metavar="NAME", help="Topic, if a bag has several of a kind; repeatable."),
-    ] = None,
+    camera_in_body: CameraInBody = None,
+    image_size: ImageSize = None,
+    first_frame: FirstFrame = None,
+    nms: Nms = None,
+    max_bad: MaxBad = 0.05,
+    topics: Topics = None,
     config: ConfigFile = None,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
     """Convert a camera, a trajectory or detections to another format, or a bag to a folder.
 
-    Formats: json toml ros colmap kitti-calib | tum kitti euroc | csv coco yolo mot | rosbag (read).
+    Formats: see docs/formats.md. All are read; written are json toml ros colmap kitti-calib, tum
+    kitti euroc, csv coco yolo mot. IN may be a .gz file, or - for standard input.
     If the format of OUT has no times, they go into a file beside it.
     """
     from dqslam import io
 
     output = Output(quiet=quiet, as_json=json)
-    size = None
+    refuse_shared_input(source, camera, frame_times, classes, camera_in_body)
+    reading = given_reading(first_frame, max_bad, nms, topics, camera_in_body, image_size)
+    size = reading.image_size
     if camera is not None:
-        lens = io.read_camera(camera)
+        lens = io.read_camera(camera, image_size=size)
         size = (lens.width, lens.height)
+    notes = io.Notes(max_bad=max_bad)
     context = io.ConvertContext(
         size=size,
         frames=given_frame_times(frame_times, frame_rate),
+        first_frame=first_frame,
         classes=None if classes is None else io.read_class_names(classes),
-        body_from_camera=None if camera_in_body is None else io.read_mount(camera_in_body),
+        body_from_camera=reading.body_from_camera,
+        nms=nms,
+        notes=notes,
     )
     with output.share("converting") as progress:
         written = io.convert(
@@ -71,14 +86,16 @@ def convert(
             out,
             format=format_,
             to=to,
-            topics=topic or (),
+            topics=topics or (),
             context=context,
             progress=progress,
         )
+    for sentence in notes.sentences():
+        output.warn(sentence)
     for file in written:
         loses = f"; no place for {' and '.join(file.loses)}" if file.loses else ""
         output.line(f"wrote {file.path}: {file.what}{loses}")
     described = [
         {"path": str(file.path), "what": file.what, "loses": file.loses} for file in written
     ]
-    output.document({"written": described})
+    output.document({"written": described, "input_notes": notes.described()})

@@ -6,13 +6,20 @@ import typer
 
 from dqslam.cli.options import (
     CameraFile,
+    CameraInBody,
     DetectionFile,
+    FirstFrame,
     Formats,
     FrameRate,
     FrameTimesFile,
+    ImageSize,
+    MaxBad,
     MaxTimeDifference,
+    Nms,
     OdometryFile,
+    Topics,
     given_frame_times,
+    given_reading,
 )
 from dqslam.cli.output import Json, Output, Quiet
 from dqslam.cli.settings import ConfigFile
@@ -21,6 +28,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from dqslam.inspection import Inspection
+    from dqslam.io import Notes
 
 MOST_LISTED = 8
 FOUND = 3  # exit code of --strict
@@ -33,13 +41,22 @@ def inspect(
     formats: Formats = None,
     frame_times: FrameTimesFile = None,
     frame_rate: FrameRate = None,
+    first_frame: FirstFrame = None,
+    camera_in_body: CameraInBody = None,
+    image_size: ImageSize = None,
+    topics: Topics = None,
+    nms: Nms = None,
+    max_bad: MaxBad = 0.05,
     ids: Annotated[
         Literal["track_id", "class_id"] | None,
         typer.Option(help="Column with the ids of objects. Default: boxes are linked by overlap."),
     ] = None,
     max_time_difference: MaxTimeDifference = None,
     strict: Annotated[
-        bool, typer.Option("--strict", help=f"Exit with {FOUND} if there are warnings.")
+        bool,
+        typer.Option(
+            "--strict", help=f"Exit with {FOUND} if there are warnings, or bad boxes or poses."
+        ),
     ] = False,
     config: ConfigFile = None,
     quiet: Quiet = False,
@@ -58,29 +75,28 @@ def inspect(
     with output.steps("inspecting", 3) as done:
         frames = given_frame_times(frame_times, frame_rate)
         frames = frames or io.choose_frame_times(odometry, detections, names)
-        lens = io.read_camera(camera, names.camera)
-        path = io.read_trajectory(odometry, names.trajectory, frames=frames)
+        reading = given_reading(first_frame, max_bad, nms, topics, camera_in_body, image_size)
+        notes = io.Notes(max_bad=max_bad)
+        io.check_topics(camera, odometry, detections, reading)
+        lens = io.read_camera_file(camera, names, reading)
+        path = io.read_path_file(odometry, names, frames, reading, notes)
         done()
-        table = io.read_detections(
-            detections,
-            names.detections,
-            width=lens.width,
-            height=lens.height,
-            frames=frames,
-            cut=False,
-            check=False,
+        table = io.read_boxes_file(
+            detections, lens, path, names, frames, reading, notes, check=False
         )
         done()
         inspection = inspect_recording(
             lens, path, table, ids=ids, max_time_difference=max_time_difference
         )
-    _show(output, inspection)
-    if strict and inspection.findings:
+    _show(output, inspection, notes)
+    if strict and (inspection.findings or notes.left_out):
         raise typer.Exit(FOUND)
 
 
-def _show(output: Output, inspection: "Inspection") -> None:
+def _show(output: Output, inspection: "Inspection", notes: "Notes") -> None:
     output.table(_overview(inspection.summary))
+    for sentence in notes.sentences():
+        output.warn(sentence)
     for finding in inspection.findings:
         output.line(f"warning: {finding.check}: {finding.message}", style="bold red")
     for check, why in inspection.unchecked.items():
@@ -88,7 +104,14 @@ def _show(output: Output, inspection: "Inspection") -> None:
     if not inspection.findings:
         output.line("no mistake found")
     warnings = [vars(finding) for finding in inspection.findings]
-    output.document({**inspection.summary, "warnings": warnings, "unchecked": inspection.unchecked})
+    output.document(
+        {
+            **inspection.summary,
+            "warnings": warnings,
+            "unchecked": inspection.unchecked,
+            "input_notes": notes.described(),
+        }
+    )
 
 
 def _overview(summary: dict[str, Any]) -> "Table":

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 if TYPE_CHECKING:
-    from dqslam.io import FrameTimes
+    from dqslam.io import FrameTimes, ReadOptions
 
 CameraFile = Annotated[Path, typer.Option(help="Camera file: JSON, TOML, ROS, COLMAP, KITTI, bag.")]
 OdometryFile = Annotated[Path, typer.Option(help="Trajectory file: TUM, KITTI, EuRoC, bag.")]
@@ -28,6 +28,49 @@ FrameRate = Annotated[
     typer.Option(
         metavar="HZ",
         help="Frames per second, with frame 0 at 0 s. Default: --frame-times or the files.",
+    ),
+]
+FirstFrame = Annotated[
+    int | None,
+    typer.Option(
+        min=0,
+        metavar="N",
+        help="Number of the first frame in the file of boxes. Default: 1 for MOT, else 0.",
+    ),
+]
+MaxBad = Annotated[
+    float,
+    typer.Option(
+        min=0.0,
+        max=1.0,
+        metavar="SHARE",
+        help="Share of bad boxes or poses that are left out; with more, a file is refused.",
+    ),
+]
+Nms = Annotated[
+    float | None,
+    typer.Option(
+        metavar="IOU",
+        help="Leave out boxes that overlap a better one of their image by this, 0 to 1, of any "
+        "class.",
+    ),
+]
+Topics = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--topic", metavar="NAME", help="Topic, if a bag has several of a kind; repeatable."
+    ),
+]
+CameraInBody = Annotated[
+    Path | None,
+    typer.Option(
+        help="File with body_from_camera, 7, 12 or 16 numbers, if the poses are a body's."
+    ),
+]
+ImageSize = Annotated[
+    str | None,
+    typer.Option(
+        metavar="WIDTHxHEIGHT", help="Size of the image in pixels, for a camera that has none."
     ),
 ]
 MaxTimeDifference = Annotated[
@@ -87,3 +130,35 @@ def given_frame_times(table: Path | None, rate: float | None) -> "FrameTimes | N
     if table is not None:
         return io.read_frame_times(table)
     return None if rate is None else io.frame_rate(rate)
+
+
+def given_image_size(text: str | None) -> tuple[int, int] | None:
+    """Return width and height from text like 640x480."""
+    if text is None:
+        return None
+    width, _, height = text.lower().partition("x")
+    if not (width.strip().isdecimal() and height.strip().isdecimal()):
+        raise ValueError(f"--image-size: {text!r} is not like 640x480")
+    return int(width), int(height)
+
+
+def given_reading(
+    first_frame: int | None,
+    max_bad: float,
+    nms: float | None,
+    topics: list[str] | None,
+    camera_in_body: Path | None,
+    image_size: str | None,
+) -> "ReadOptions":
+    """Return how files are read from these options."""
+    from dqslam import io
+
+    mount = None if camera_in_body is None else io.read_mount(camera_in_body)
+    return io.ReadOptions(
+        first_frame=first_frame,
+        max_bad=max_bad,
+        nms=nms,
+        topics=tuple(topics or ()),
+        body_from_camera=None if mount is None else tuple(mount.tolist()),
+        image_size=given_image_size(image_size),
+    )

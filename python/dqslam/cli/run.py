@@ -9,14 +9,21 @@ import typer
 
 from dqslam.cli.options import (
     CameraFile,
+    CameraInBody,
     DetectionFile,
+    FirstFrame,
     Formats,
     FrameRate,
     FrameTimesFile,
+    ImageSize,
+    MaxBad,
     MaxTimeDifference,
+    Nms,
     OdometryFile,
     ResultDirectory,
+    Topics,
     given_frame_times,
+    given_reading,
 )
 from dqslam.cli.output import Json, Output, Quiet
 from dqslam.cli.run_tables import show_report
@@ -40,6 +47,15 @@ def run(
     formats: Formats = None,
     frame_times: FrameTimesFile = None,
     frame_rate: FrameRate = None,
+    first_frame: FirstFrame = None,
+    camera_in_body: CameraInBody = None,
+    image_size: ImageSize = None,
+    topics: Topics = None,
+    nms: Nms = None,
+    max_bad: MaxBad = 0.05,
+    strict: Annotated[
+        bool, typer.Option("--strict", help="Refuse any bad box or pose, as --max-bad 0 does.")
+    ] = False,
     ids: Annotated[
         Literal["none", "track_id", "class_id"],
         typer.Option(
@@ -134,6 +150,9 @@ def run(
         min_score=min_score,
         formats=io.split_formats(formats or []),
         frames=given_frame_times(frame_times, frame_rate),
+        reading=given_reading(
+            first_frame, 0.0 if strict else max_bad, nms, topics, camera_in_body, image_size
+        ),
         max_time_difference=max_time_difference,
         added_noise=added,
         odometry_noise=believed,

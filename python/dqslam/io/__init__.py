@@ -20,6 +20,10 @@ from dqslam.io.notes import InputWarning as InputWarning
 from dqslam.io.notes import Notes as Notes
 from dqslam.io.ply import write_ply as write_ply
 from dqslam.io.reading import ReadOptions as ReadOptions
+from dqslam.io.reading import check_topics as check_topics
+from dqslam.io.reading import read_boxes_file as read_boxes_file
+from dqslam.io.reading import read_camera_file as read_camera_file
+from dqslam.io.reading import read_path_file as read_path_file
 from dqslam.io.recording import Dropped as Dropped
 from dqslam.io.recording import load_recording as load_recording
 from dqslam.io.recording import nearest_pose as nearest_pose

@@ -141,7 +141,7 @@ def _varying(
 def _in_date(stem: str, place: int) -> bool:
     number = [match.span() for match in NUMBER.finditer(stem)][place]
     dates = [match.span() for match in DATE_AND_TIME.finditer(stem)]
-    return any(start < number[1] and number[0] < end for start, end in dates)
+    return any(start <= number[0] and number[1] <= end for start, end in dates)
 
 
 def _refuse_two(

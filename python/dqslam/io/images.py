@@ -56,10 +56,11 @@ def find_images(
 
 def _framed(files: list[Path], frames: FrameTimes) -> tuple[list[Path], Floats]:
     """Return the images whose frame has a time, and their times."""
-    names = [file.name for file in files]
     if frames.names:
-        numbers = [frames.names.get(image_name(name)) for name in names]
+        numbers = [frames.names.get(image_name(file.name)) for file in files]
     else:
+        files = [file for file in files if any(sign.isdigit() for sign in file.stem)]
+        names = [file.name for file in files]
         try:
             found, own_times = frames_of_images(names)
         except ImageNameError as error:

@@ -73,5 +73,5 @@ def _is_fraction(label: str) -> bool:
         float(label)
     except ValueError:
         return False
-    # 1e5 and 12e4567 may be parts of hexadecimal names; 1e300 is a number that went wrong.
-    return label.replace(".", "").lstrip("+-").isdigit() or "e+" in label.lower() or "." in label
+    # 1e5 and 12e4567 may be parts of hexadecimal names.
+    return "." in label or "e+" in label.lower() or "e-" in label.lower()

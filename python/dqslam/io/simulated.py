@@ -12,7 +12,7 @@ import numpy as np
 from dqslam import _core
 from dqslam._checks import Floats
 from dqslam.io.camera.table import write_json_camera
-from dqslam.io.detections.csv import REQUIRED, write_csv
+from dqslam.io.detections.csv import COLUMNS, write_csv
 from dqslam.io.detections.table import DetectionTable
 from dqslam.io.files import write_text
 from dqslam.io.step_covariances import write_step_covariances
@@ -41,7 +41,7 @@ def save_recording(recording: Recording, directory: str | Path) -> None:
     write_step_covariances(directory / "odometry_covariance.csv", recording)
     table = DetectionTable(
         path=str(directory / "boxes.csv"),
-        columns=(*REQUIRED, "track_id"),
+        columns=(*COLUMNS, "track_id"),
         line=np.arange(2, len(boxes) + 2),
         frame=boxes.pose,
         timestamp=recording.timestamps[boxes.pose],

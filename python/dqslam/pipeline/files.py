@@ -81,7 +81,8 @@ def run_files(
         reference_name = "odometry before the added noise"
     says_noise = bool(options.believed_noise or options.odometry_covariance)
     with nullcontext() if out is None else results_directory(Path(out)):
-        recording, dropped = _load((camera, odometry, detections), options)
+        notes = io.Notes(max_bad=options.reading.max_bad)
+        recording, dropped = _load((camera, odometry, detections), options, notes)
         result = run(
             recording,
             replace(options, estimates_noise=options.estimates_noise or not says_noise),
@@ -96,16 +97,20 @@ def run_files(
             "groundtruth": None if groundtruth is None else str(groundtruth),
             **_describe(options),
             "dropped_boxes": asdict(dropped),
+            "input_notes": notes.described(),
             "reference": reference_name,
             **result.report,
         }
+        report["warnings"] = notes.sentences() + report["warnings"]
         result = replace(result, report=report)
         if out is not None:
             _save(result, Path(out), beside or {})
     return result
 
 
-def _load(files: Sequence[str | Path], options: RunFilesOptions) -> tuple[Recording, io.Dropped]:
+def _load(
+    files: Sequence[str | Path], options: RunFilesOptions, notes: io.Notes
+) -> tuple[Recording, io.Dropped]:
     """Read a recording, add noise to it if need be, and count the boxes that were left out."""
     recording, dropped = io.load_recording(
         *files,
@@ -117,6 +122,8 @@ def _load(files: Sequence[str | Path], options: RunFilesOptions) -> tuple[Record
         odometry_covariance=options.odometry_covariance,
         formats=options.formats,
         frames=options.frames,
+        reading=options.reading,
+        notes=notes,
     )
     if options.added_noise is not None:
         noisy = perturb_odometry(recording, options.added_noise, seed=options.seed).odometry

@@ -9,7 +9,7 @@ from pathlib import Path
 from dqslam import _core
 from dqslam.association import FINAL
 from dqslam.assumptions import BoxNoise, OdometryNoise, SizePrior, SizePriors
-from dqslam.io import FormatNames, FrameTimes
+from dqslam.io import FormatNames, FrameTimes, ReadOptions
 from dqslam.io.recording import Ids
 
 Progress = Callable[[float, str], None]
@@ -58,6 +58,8 @@ class RunFilesOptions(RunOptions):
     frames: FrameTimes | None = None
     """Times of frames, for files that only count them; None takes their numbers for seconds where
     the trajectory counts frames, too."""
+    reading: ReadOptions = ReadOptions()
+    """How the files are read beside that: bad records, the first frame, topics, mount."""
     max_time_difference: float | None = None
     """Seconds from a box to its pose; None is half the median interval between poses."""
     added_noise: OdometryNoise | None = None

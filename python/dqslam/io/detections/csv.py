@@ -42,8 +42,8 @@ COLUMNS = ("frame", "timestamp", *CORNERS, "score", "class_id", "class_name")
 
 def read_csv(path: str | Path, context: ReadContext) -> DetectionTable:
     """Read boxes, unchecked."""
-    cells = read_table(path)
-    names = known_columns(path, cells.columns, context.notes)
+    cells = read_table(path, allow_empty=True)
+    names = known_columns(path, cells.columns, context.notes, cells.header)
     edges = SIZES if not {"x2", "y2"} & set(names) and "width" in names else CORNERS
     missing = [name for name in edges if name not in names]
     if not {"frame", "timestamp", "image"} & set(names):
@@ -51,6 +51,8 @@ def read_csv(path: str | Path, context: ReadContext) -> DetectionTable:
     if missing:
         message = f"no column {', '.join(missing)} (it has: {', '.join(cells.columns)})"
         raise FileError(path, message, cells.header)
+    if not len(cells):
+        raise FileError(path, "holds no rows, only a header")
     # Numbers of frames go before names of images.
     numbered = "frame" in names
     records = Records(

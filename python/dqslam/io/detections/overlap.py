@@ -9,7 +9,7 @@ from dqslam.io.detections.table import DetectionTable
 from dqslam.io.notes import Notes
 
 COINCIDE = 0.7  #: least intersection over union of boxes that show the same thing
-MANY = 0.05  #: share of the boxes that may coincide with another one by chance
+FEW, MANY = 5, 0.05  #: number, and share of the boxes, that may coincide by chance
 
 
 def suppress(table: DetectionTable, iou: float) -> Bools:
@@ -55,7 +55,7 @@ def doubt_doubles(table: DetectionTable, notes: Notes) -> None:
     if not len(table):
         return
     doubles = int(np.sum(~suppress(table, COINCIDE)))
-    if doubles > MANY * len(table):
+    if doubles > max(FEW, MANY * len(table)):
         notes.doubt(
             table.path,
             f"{doubles} of {len(table)} boxes overlap a better one of their image by "

@@ -85,9 +85,9 @@ def without_bad(
 ) -> DetectionTable:
     """Leave out the bad boxes (m,) that count, those with a score of at least ``min_score``.
 
-    Boxes with a lower score are left out later, whatever else is wrong with them.
+    Boxes with a lower score, from 0, are left out later, whatever else is wrong with them.
     """
-    counts = ~(table.score < min_score) | notes.is_strict
+    counts = ~((table.score >= 0) & (table.score < min_score)) | notes.is_strict
     worst = bad & counts
     notes.leave_out(
         table.path,

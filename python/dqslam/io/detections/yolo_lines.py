@@ -77,9 +77,6 @@ def _boxes(
 ) -> YoloBoxes:
     counts = {len(row) for row in values}
     extra = [line.cells[5:] for line in lines]
-    if counts == {4, 5, 6}:
-        line = next(line for line in lines if len(line.cells) == 6)
-        raise line.error("6 fields, where others have 5 and 7: is the 6th the score or the id?")
     share = _of_centers(np.array([row[:4] for row in values]))
     return YoloBoxes(share, *_extras(lines, extra, 6 not in counts, notes, folder))
 

@@ -38,6 +38,8 @@ def read_columns(path: str | Path, context: ReadContext) -> Trajectory:
     rows, lines = read_rows(path)
     comments = [line for line in read_text(path).split("\n", 50)[:50] if line.startswith("#")]
     header = find_header(comments, rows[0]) or PLAIN
+    if header is PLAIN and "," in rows[0]:
+        context.notes.doubt(path, "no header: the quaternion is read as x y z w, as in TUM")
     is_row = header is not PLAIN and not _is_number(split_row(rows[0])[-1])
     if is_row:
         rows, lines = rows[1:], lines[1:]

@@ -42,10 +42,14 @@ def _looks(look: Look) -> bool:
     try:
         values = [float(cell) for cell in cells]
     except ValueError:
-        return False
+        # Its error names the cell. A camera of COLMAP has 8 fields, too, its model in the second.
+        return "," not in look.first and len(cells) == len(FIELDS) and not cells[1][0].isupper()
+    if "," in look.first and cells[0].isdigit():
+        return False  # EuRoC's, with w first, or frames of MOT
     # Boxes of MOT have as many numbers, and the first is a whole one as well.
-    quaternion = np.linalg.norm(values[4:8])
-    return not quaternion > LONGEST and (len(cells) == len(FIELDS) or values[8] == int(values[8]))
+    length = np.linalg.norm(values[4:8])
+    may_turn = not np.isfinite(length) or length <= LONGEST
+    return bool(may_turn) and (len(cells) == len(FIELDS) or cells[8].isdigit())
 
 
 TUM = Format(
