@@ -185,8 +185,8 @@ def test_bad_arguments_are_one_line_and_code_2(files, capsys, arguments, message
         (1, "\n100.1 ", "\n99.1 ", "traj.txt:2: time 99.1 goes back from 100.0 (line 1)"),
         (1, "\n100.1 ", "\n100.0 ", "traj.txt:2: time 100.0 repeats 100.0"),
         (1, "\n100.1 ", "\n100.1 nan ", "traj.txt:2: 9 fields, not 8"),
-        (2, ",x2,", ",right,", "boxes.csv:1: no column x2"),
-        (2, "\n0,100.0,", "\n0,nan,", "boxes.csv:2: timestamp is nan, not finite"),
+        (2, ",x2,", ",east,", "boxes.csv:1: no column x2"),
+        (2, "\n0,100.0,", "\n0,now,", "boxes.csv:2: timestamp is 'now', not a number"),
         (2, ",0.9,1,cup,101\n1,", ",0.9,1,cup\n1,", "fields, but 10 columns"),
     ],
 )

@@ -235,7 +235,7 @@ def test_what_the_reader_refuses_is_found(tmp_path):
     percent = replace(table, score=100 * table.score)
     (finding,) = inspect(camera, trajectory, percent, "track_id").findings
     assert finding.check == "boxes"
-    assert finding.message.endswith("scattered.csv:2: score is 100, not between 0 and 1")
+    assert "scattered.csv:2: score is 100, not between 0 and 1 (" in finding.message
 
 
 def test_what_cannot_be_told_is_said(tmp_path):

@@ -51,10 +51,10 @@ class Bag:
     def make(self, name, *fields):
         return self.store.types[name](*fields)
 
-    def header(self, time):
+    def header(self, time, frame="map"):
         seconds = int(time)
         stamp = self.make("builtin_interfaces/msg/Time", seconds, round((time - seconds) * 1e9))
-        return self.make("std_msgs/msg/Header", stamp, "map")
+        return self.make("std_msgs/msg/Header", stamp, frame)
 
     def pose(self, p=(0, 0, 0), q=(0, 0, 0, 1)):
         pose = self.make(
@@ -64,12 +64,12 @@ class Bag:
         )
         return self.make("geometry_msgs/msg/PoseWithCovariance", pose, np.zeros(36))
 
-    def odometry(self, time, p, q):
+    def odometry(self, time, p, q, child="camera"):
         zero = self.make("geometry_msgs/msg/Vector3", 0.0, 0.0, 0.0)
         twist = self.make("geometry_msgs/msg/Twist", zero, zero)
         twist = self.make("geometry_msgs/msg/TwistWithCovariance", twist, np.zeros(36))
         name = "nav_msgs/msg/Odometry"
-        return name, self.make(name, self.header(time), "base_link", self.pose(p, q), twist)
+        return name, self.make(name, self.header(time), child, self.pose(p, q), twist)
 
     def boxes(self, time, *rows, theta=0.0):
         """Each row: x, y, width, height, ((class, score), ...), id."""
@@ -102,7 +102,7 @@ class Bag:
         p = np.insert(k, [3, 6, 9], 0.0)
         distortion = np.array([0.1, -0.2, 0.003, -0.004, 0.05])
         lens = ("plumb_bob", distortion, k, np.eye(3).ravel(), p)
-        return name, self.make(name, self.header(0.5), 480, 640, *lens, 0, 0, region)
+        return name, self.make(name, self.header(0.5, "camera"), 480, 640, *lens, 0, 0, region)
 
     def write(self, path, topics, plugin=StoragePlugin.SQLITE3):
         with Writer(path, version=9, storage_plugin=plugin) as writer:
@@ -222,9 +222,9 @@ def test_a_bag_of_ros_1(tmp_path):
     bag = Bag()
     bag.store = store
 
-    def header(time):
+    def header(time, frame="map"):
         stamp = bag.make("builtin_interfaces/msg/Time", int(time), round(time % 1 * 1e9))
-        return bag.make("std_msgs/msg/Header", 7, stamp, "map")
+        return bag.make("std_msgs/msg/Header", 7, stamp, frame)
 
     bag.header = header
     odometry, message = bag.odometry(*ODOMETRY[0])

@@ -19,6 +19,8 @@ from dqslam.inspection.rays import BEHIND_PX, Views, inverted, residuals
 from dqslam.io import FileError
 from dqslam.io.detections.table import checked
 
+# Boxes below the default of `dqslam run --min-score` do not refuse a file.
+LEAST_SCORE = 0.5
 Floats = NDArray[np.float64]
 
 # The share of the median residual that the other interpretation must fall below. Corners: for right
@@ -191,7 +193,13 @@ def check_boxes(evidence: Evidence) -> Finding | None:
     """Check whether the reader accepts all boxes, scores and times, as in `dqslam run`."""
     camera = evidence.camera
     try:
-        checked(evidence.table, width=camera.width, height=camera.height, cut=True)
+        checked(
+            evidence.table,
+            width=camera.width,
+            height=camera.height,
+            cut=True,
+            min_score=LEAST_SCORE,
+        )
     except FileError as error:
         return Finding("boxes", f"the file will be refused: {error}")
     return None

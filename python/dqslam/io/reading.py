@@ -90,7 +90,6 @@ def read_boxes_file(
         height=camera.height,
         frames=frames,
         first_frame=options.first_frame,
-        cut=check,
         check=check,
         min_score=min_score,
         nms=options.nms,

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from dqslam._input import exists
+from dqslam._input import exists, refuse_shared_input
 from dqslam.io.camera import CAMERA_FORMATS
 from dqslam.io.detections import DETECTION_FORMATS
 from dqslam.io.files import FileError, read_rows, read_text
@@ -69,6 +69,7 @@ def choose_frame_times(
     If the trajectory numbers frames, the number of a frame is its time, for both files. Otherwise
     the result is None: the boxes have times of their own, or reading them raises an error.
     """
+    refuse_shared_input(odometry, detections)
     path = choose_format(odometry, formats.trajectory, TRAJECTORY_FORMATS, "trajectory")
     boxes = choose_format(detections, formats.detections, DETECTION_FORMATS, "detections")
     timed = guarded(odometry, path.name, path.has_times, Path(odometry))

@@ -15,7 +15,7 @@ from dqslam.io.detections.overlap import doubt_doubles, suppress
 from dqslam.io.detections.rosbag import ARRAYS
 from dqslam.io.detections.table import DetectionTable, checked
 from dqslam.io.detections.yolo import YOLO, read_data_names
-from dqslam.io.files import read_text
+from dqslam.io.files import FileError, read_text
 from dqslam.io.formats import Progress, ReadContext, choose_format, guarded, no_progress
 from dqslam.io.frames import FrameTimes
 from dqslam.io.notes import Notes
@@ -76,7 +76,8 @@ def read_detections(
         bad.
     check
         Whether to find inverted boxes, scores outside of 0 to 1, and times that do not
-        increase. Without it the table has the content of the file, for a search for mistakes.
+        increase. Without it the table has the content of the file, for a search for mistakes, and
+        what would be left out is only noted.
     min_score
         Boxes with a lower score, 0 to 1, do not count: they stay, whatever else is wrong with them.
     nms
@@ -110,20 +111,21 @@ def read_detections(
         notes=own,
     )
     table: DetectionTable = guarded(path, chosen.name, chosen.read, path, context)
+    good = table
+    try:
+        good = checked(table, width=width, height=height, cut=cut, min_score=min_score, notes=own)
+    except FileError:
+        if check:
+            raise
     if check:
-        table = checked(table, width=width, height=height, cut=cut, min_score=min_score, notes=own)
+        table = good
     if nms is not None:
         keep = suppress(table, nms)
-        own.skip(
-            table.path,
-            "boxes",
-            f"they overlap a better one by {nms:g} or more (nms)",
-            int((~keep).sum()),
-            len(keep),
-        )
+        reason = f"they overlap a better one by {nms:g} or more (nms)"
+        own.skip(table.path, "boxes", reason, int((~keep).sum()), len(keep))
         table = table.select(keep)
-    elif check:
-        doubt_doubles(table.select(table.score >= min_score), own)
+    else:
+        doubt_doubles(good.select(good.score >= min_score), own)
     if notes is None:
         own.warn()
     return table

@@ -8,7 +8,8 @@ from dqslam._checks import Bools, Floats, Ints
 from dqslam.io.detections.table import DetectionTable
 from dqslam.io.notes import Notes
 
-COINCIDE = 0.7  #: least intersection over union of boxes that show the same thing
+COINCIDE = 0.7  #: least intersection over union of boxes that surely show the same thing
+USUAL = 0.5  #: what detectors suppress
 FEW, MANY = 5, 0.05  #: number, and share of the boxes, that may coincide by chance
 
 
@@ -59,8 +60,7 @@ def doubt_doubles(table: DetectionTable, notes: Notes) -> None:
         notes.doubt(
             table.path,
             f"{doubles} of {len(table)} boxes overlap a better one of their image by "
-            f"{COINCIDE:.0%} or more: --nms {COINCIDE:g} leaves them out, if they show the same "
-            "thing",
+            f"{COINCIDE:.0%} or more: if they show the same thing, --nms {USUAL:g} leaves them out",
         )
 
 
