@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dqslam._files import results_directory
-from dqslam.cli.options import FirstSeed, Jobs, ResultDirectory
+from dqslam.cli.options import MOST_TRIALS, FirstSeed, Jobs, ResultDirectory
 from dqslam.cli.output import Json, Output, Quiet
 from dqslam.cli.results import save_study
 from dqslam.cli.settings import ConfigFile
@@ -21,7 +21,7 @@ def ablation(
     context: typer.Context,
     out: ResultDirectory,
     trials: Annotated[
-        int, typer.Option(min=1, help="Drives to solve; each takes 20 seconds.")
+        int, typer.Option(min=1, max=MOST_TRIALS, help="Drives to solve; each takes 20 seconds.")
     ] = 10,
     seed: FirstSeed = 0,
     jobs: Jobs = None,

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dqslam._files import results_directory
-from dqslam.cli.options import FirstSeed, ResultDirectory
+from dqslam.cli.options import MOST_TRIALS, FirstSeed, ResultDirectory
 from dqslam.cli.output import Json, Output, Quiet
 from dqslam.cli.results import save_study
 from dqslam.cli.settings import ConfigFile
@@ -19,7 +19,9 @@ if TYPE_CHECKING:
 def degeneracy(
     context: typer.Context,
     out: ResultDirectory,
-    trials: Annotated[int, typer.Option(min=1, help="Objects to observe along each motion.")] = 50,
+    trials: Annotated[
+        int, typer.Option(min=1, max=MOST_TRIALS, help="Objects to observe along each motion.")
+    ] = 50,
     seed: FirstSeed = 0,
     config: ConfigFile = None,
     quiet: Quiet = False,

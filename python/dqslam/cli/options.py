@@ -80,6 +80,7 @@ MaxTimeDifference = Annotated[
 ResultDirectory = Annotated[
     Path, typer.Option("--out", metavar="DIR", help="Directory of the results, created if needed.")
 ]
+MOST_TRIALS = 1_000_000  # a larger number is a slip
 FirstSeed = Annotated[
     int, typer.Option(min=0, help="Seed of the first trial; each next trial adds 1.")
 ]

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from dqslam._files import results_directory, uninterrupted
-from dqslam.cli.options import BackendName, FirstSeed, Jobs, ResultDirectory, Scheduler
+from dqslam.cli.options import MOST_TRIALS, BackendName, FirstSeed, Jobs, ResultDirectory, Scheduler
 from dqslam.cli.output import Json, Output, Quiet
 from dqslam.cli.results import draw_figure
 from dqslam.cli.settings import CONFIG, ConfigFile, save_settings
@@ -45,7 +45,9 @@ EXAMPLES = 6  # maps drawn, as in the paper's figure
 def paper(
     context: typer.Context,
     out: ResultDirectory,
-    trials: Annotated[int, typer.Option(min=1, help="Drives to simulate and solve.")] = 50,
+    trials: Annotated[
+        int, typer.Option(min=1, max=MOST_TRIALS, help="Drives to simulate and solve.")
+    ] = 50,
     seed: FirstSeed = 0,
     scenario: Annotated[
         str,

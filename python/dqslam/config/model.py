@@ -59,6 +59,10 @@ def read_toml(path: str | Path) -> TomlFile:
         line = None if at is None else int(at[2] or text.rstrip().count("\n") + 1)
         message = str(error) if at is None else at[1]
         raise FileError(path, f"not a TOML file: {message}", line) from None
+    except RecursionError:
+        raise FileError(path, "nested too deeply") from None
+    except ValueError as error:  # such as a whole number of more than 4300 digits
+        raise FileError(path, f"not a TOML file: {error}") from None
 
 
 def load_toml_model(path: str | Path, model: type[Model]) -> Model:

@@ -10,7 +10,10 @@ from pydantic import BaseModel, ConfigDict, Field
 Positive = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
 Share = Annotated[float, Field(ge=0.0, lt=1.0)]
-Count = Annotated[int, Field(ge=1)]
+# A larger number is a slip: what it asks for would fill the memory.
+MOST = 1_000_000
+MOST_POSES = 10 * MOST
+Count = Annotated[int, Field(ge=1, le=MOST)]
 
 
 class Settings(BaseModel):

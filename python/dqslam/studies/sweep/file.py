@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,6 +25,8 @@ from dqslam.studies.sweep.varied import (
     read_random,
     refuse_twice,
 )
+
+MOST = 1_000_000  #: trials of a cell, samples, and cells; a larger number is a slip
 
 
 @dataclass(frozen=True)
@@ -54,13 +57,13 @@ class _File(FileModel):
     """The settings at the top of a file. Its tables are checked setting by setting."""
 
     scenario: str
-    trials: Annotated[int, Field(ge=1)] = 50
+    trials: Annotated[int, Field(ge=1, le=MOST)] = 50
     """Number of seeds of each cell."""
     seed: Annotated[int, Field(ge=0)] = 0
     """The first seed."""
     bound: bool = False
     """Whether to compare with the posterior bound and the optimum."""
-    samples: Annotated[int, Field(ge=1)] = 1
+    samples: Annotated[int, Field(ge=1, le=MOST)] = 1
     """Number of random samples, each combined with every cell of the grid."""
     sample_seed: Annotated[int, Field(ge=0)] = 0
     fixed: dict[str, Any] = {}
@@ -88,6 +91,9 @@ def load_sweep(path: str | Path) -> Sweep:
     random = read_random(file, top.random, mistakes, samples=top.samples, seed=top.sample_seed)
     refuse_twice(file, (fixed, grid, random), mistakes)
     _refuse_unknown(file, scenario, top, mistakes)
+    count = top.samples * math.prod(len(values) for values in grid.values())
+    if count > MOST:
+        raise FileError(file.path, f"it has {count} cells, more than {MOST}")
     cells = []
     for values, places in combinations(top.samples, fixed, grid, random):
         try:
