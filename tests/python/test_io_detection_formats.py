@@ -235,7 +235,7 @@ def test_many_inverted_boxes_are_another_format(tmp_path):
     path = write(tmp_path, "a.csv", "\n".join([CSV.split(",track_id")[0], *rows]))
     with pytest.raises(
         FileError,
-        match=r":2: inverted box .*are they x, y, width, height\? \(9 of 9 boxes are bad, 5% may be",
+        match=r":2: inverted box .*x, y, width, height\? \(9 of 9 boxes are bad, 5% may be",
     ):
         read(path)
 

@@ -7,6 +7,7 @@ from typing import Any
 
 from dqslam.io.files import FileError
 
+DEEPEST = 100  #: levels of nesting
 MOST_CHARACTERS = 10_000_000  #: PyYAML reads about a million in a second
 
 
@@ -24,13 +25,16 @@ def parse_yaml(path: str | Path, text: str) -> dict[str, Any]:
         raise FileError(path, f"has more than {MOST_CHARACTERS} characters")
     # OpenCV starts its files with %YAML:1.0, which is not YAML; `rostopic echo` ends with ---.
     text = text.replace("%YAML:1.0", "---", 1)
+    depth = 0
     try:
         for event in yaml.parse(text, yaml.SafeLoader):
+            depth += isinstance(event, yaml.CollectionStartEvent)
+            depth -= isinstance(event, yaml.CollectionEndEvent)
+            line = event.start_mark.line + 1
             if isinstance(event, yaml.AliasEvent):
-                line = event.start_mark.line + 1
-                raise FileError(
-                    path, f"has an alias, *{event.anchor[:40]}, which is not read", line
-                )
+                raise FileError(path, f"has an alias, *{event.anchor[:40]}: not read", line)
+            if depth > DEEPEST:  # PyYAML's time grows with its square
+                raise FileError(path, "nested too deeply", line)
             if isinstance(event, yaml.DocumentEndEvent):
                 break
         table = next(iter(yaml.safe_load_all(text)), None)

@@ -135,8 +135,10 @@ def read_class_names(path: str | Path) -> dict[int, str]:
     """Read class names by id from COCO's categories, a data.yaml, or a text, one per line."""
     suffix = Path(plain_name(path)).suffix.lower()
     if suffix == ".json":
-        return guarded(path, "coco", read_categories, path)
+        names: dict[int, str] = guarded(path, "coco", read_categories, path)
+        return names
     if suffix in (".yaml", ".yml"):
-        return guarded(path, "yaml", read_data_names, path)
+        names = guarded(path, "yaml", read_data_names, path)
+        return names
     lines = read_text(path).rstrip("\n").split("\n")
     return {number: line.strip() for number, line in enumerate(lines) if line.strip()}

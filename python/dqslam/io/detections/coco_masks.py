@@ -36,9 +36,9 @@ def _run_length_box(entry: Entry, shape: dict[str, Any]) -> list[float]:
     if not isinstance(size, list) or len(size) != 2 or not all(isinstance(n, int) for n in size):
         raise entry.error("segmentation has no size [height, width]")
     runs = _unpacked(entry, counts) if isinstance(counts, str) else counts
-    whole = isinstance(runs, list) and all(isinstance(n, int) and n >= 0 for n in runs)
     height, pixels = size[0], size[0] * size[1]
-    if not whole or not 0 < pixels <= MOST_PIXELS or sum(runs) != pixels:
+    whole = isinstance(runs, list) and all(isinstance(n, int) and n >= 0 for n in runs)
+    if not isinstance(runs, list) or not whole or sum(runs) != pixels or pixels > MOST_PIXELS:
         raise entry.error("segmentation has counts that are no run lengths of its size")
     ends = np.cumsum(np.array(runs, dtype=np.int64))
     starts, ends = ends[:-1:2], ends[1::2]

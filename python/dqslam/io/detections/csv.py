@@ -53,6 +53,10 @@ def read_csv(path: str | Path, context: ReadContext) -> DetectionTable:
         raise FileError(path, message, cells.header)
     if not len(cells):
         raise FileError(path, "holds no rows, only a header")
+
+    def labels(name: str) -> tuple[str, ...] | None:
+        return cells.cells(names[name]) if name in names else None
+
     # Numbers of frames go before names of images.
     numbered = "frame" in names
     records = Records(
@@ -63,10 +67,9 @@ def read_csv(path: str | Path, context: ReadContext) -> DetectionTable:
         image=cells.cells(names["image"]) if "image" in names and not numbered else None,
         time=_floats(cells, names["timestamp"]) if "timestamp" in names else None,
         score=_floats(cells, names["score"], NO_SCORE) if "score" in names else None,
-        **{
-            name: cells.cells(names[name]) if name in names else None
-            for name in ("class_id", "class_name", "track_id")
-        },
+        class_id=labels("class_id"),
+        class_name=labels("class_name"),
+        track_id=labels("track_id"),
     )
     return make_table(path, "csv", records, context)
 

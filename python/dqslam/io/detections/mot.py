@@ -131,7 +131,7 @@ def _looks(look: Look) -> bool:
     if len(cells) not in WIDTHS or cells[0] >= LARGEST_FRAME or cells[0] != int(cells[0]):
         return False
     # A pose has 8 numbers, too.
-    return len(cells) != 8 or abs(np.linalg.norm(cells[4:]) - 1) > UNIT
+    return len(cells) != 8 or bool(abs(np.linalg.norm(cells[4:]) - 1) > UNIT)
 
 
 MOT = Format(

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -27,9 +27,18 @@ COLUMNS = ("stamp", "bbox", "class_id", "score", "id")
 NO_TURN = 1e-4  #: rad; a smaller angle moves no edge by a tenth of a pixel
 
 
+class Hypothesis(NamedTuple):
+    """A class that a detection may have."""
+
+    label: str
+    score: float
+
+
 def read_detection_arrays(path: str | Path, context: ReadContext) -> DetectionTable:
     """Read boxes, unchecked."""
-    frame, line, times, boxes, best, tracks = [], [], [], [], [], []
+    frame, line, times, tracks = [], [], [], []
+    boxes: list[list[float]] = []
+    best: list[Hypothesis | None] = []
     turned: dict[int, tuple[str, float]] = {}
     seen: dict[float, list[Any]] = {}
     repeated, count = [], 0
@@ -81,14 +90,15 @@ def read_detection_arrays(path: str | Path, context: ReadContext) -> DetectionTa
     context.notes.skip(path, "boxes", "detections without a class", nameless, len(boxes))
     if not classified:
         context.notes.doubt(path, 'no detection has a class: all are taken for the class "object"')
+    kept_best = [best[row] for row in kept]
     records = Records(
         columns=COLUMNS,
         line=[line[row] for row in kept],
         box=np.array([boxes[row] for row in kept]).reshape(-1, 4),
         frame=np.array([frame[row] for row in kept], dtype=np.int64),
         time=np.array([times[row] for row in kept]),
-        score=np.array([best[row][1] if best[row] else NO_SCORE for row in kept]),
-        class_id=[best[row][0] for row in kept] if classified else None,
+        score=np.array([one.score if one else NO_SCORE for one in kept_best]),
+        class_id=[one.label if one else "" for one in kept_best] if classified else None,
         track_id=[tracks[row] for row in kept] if any(tracks) else None,
     )
     return make_table(path, NAME, records, context)
@@ -105,23 +115,23 @@ def _time(path: str | Path, where: str, message: Any) -> float:
     return own.pop()
 
 
-def _content(detection: Any) -> tuple[list[float], float, tuple[str, float] | None, str]:
+def _content(detection: Any) -> tuple[list[float], float, Hypothesis | None, str]:
     """Return corners [px], angle [rad], the best class with its score, and the id."""
     bbox = detection.bbox
     center = getattr(bbox.center, "position", bbox.center)
     x, y, w, h = center.x, center.y, bbox.size_x, bbox.size_y
     corners = [x - w / 2, y - h / 2, x + w / 2, y + h / 2]
     hypotheses = [_hypothesis(result) for result in detection.results]
-    best = max(hypotheses, key=lambda one: one[1]) if hypotheses else None
+    best = max(hypotheses, key=lambda one: one.score) if hypotheses else None
     track = str(getattr(detection, "id", getattr(detection, "tracking_id", "")))
     return corners, float(bbox.center.theta), best, track
 
 
-def _hypothesis(result: Any) -> tuple[str, float]:
+def _hypothesis(result: Any) -> Hypothesis:
     # vision_msgs 4 wraps the fields that version 3 (string) and ROS 1 (int64) have beside the pose.
     inner = getattr(result, "hypothesis", result)
     label = getattr(inner, "class_id", None)
-    return str(inner.id if label is None else label), float(inner.score)
+    return Hypothesis(str(inner.id if label is None else label), float(inner.score))
 
 
 ARRAYS = Format(NAME, LOOKS, looks_like_bag, read_detection_arrays)

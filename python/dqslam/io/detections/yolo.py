@@ -45,6 +45,7 @@ def read_yolo(path: str | Path, context: ReadContext) -> DetectionTable:
         raise FileError(path, "is no folder of .txt files")
     if context.frames is None and (folder / TIMES).is_file():
         context = replace(context, frames=read_frame_times(folder / TIMES))
+    size = context.size
     lines = _lines(folder, context)
     if not lines:
         raise FileError(folder, "holds no boxes")
@@ -52,7 +53,7 @@ def read_yolo(path: str | Path, context: ReadContext) -> DetectionTable:
     records = Records(
         columns=FIELDS,
         line=[line.number for line in lines],
-        box=boxes.share * np.tile(context.size, 2) - CORNER,
+        box=boxes.share * np.tile(size, 2) - CORNER,
         image=[line.file.name for line in lines],
         all_images=[file.name for file in _box_files(folder)],
         score=boxes.score,

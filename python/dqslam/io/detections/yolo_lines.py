@@ -136,13 +136,13 @@ def _key_points(values: Floats) -> int | None:
             if count <= 0 or count % size:
                 continue
             points = values[:, 4 : 4 + count].reshape(len(values), -1, size)
-            seen = (points[..., :2] != 0).any(axis=2)
+            seen = np.any(points[..., :2] != 0, axis=2)
             if size == 3 and (points[..., 2] < 0).any():
                 continue
             inside = (points[..., :2] >= box[:, None, :2] - BEYOND) & (
                 points[..., :2] <= box[:, None, 2:] + BEYOND
             )
-            if seen.any() and np.mean(inside.all(axis=2)[seen]) >= IN_BOX:
+            if seen.any() and np.mean(np.all(inside, axis=2)[seen]) >= IN_BOX:
                 return 4 + count
     return None
 

@@ -63,7 +63,7 @@ def matrix_trajectory(
             raise FileError(path, message, line)
     values = parse_columns(path, FULL[: len(fields[0])], fields, lines).reshape(len(lines), -1, 4)
     matrices = values[:, :3]
-    finite = np.isfinite(values).all(axis=(1, 2))
+    finite = np.asarray(np.isfinite(values).all(axis=(1, 2)))
     rotations = np.where(finite[:, None, None], matrices[:, :, :3], np.eye(3))
     skew = np.abs(rotations @ rotations.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2))
     wrong = (skew > ROTATION_TOLERANCE) | (np.linalg.det(rotations) < 0)

@@ -71,9 +71,9 @@ def _finite(
 ) -> NDArray[np.bool_]:
     """Return which poses are finite and have a rotation, and note the others."""
     cells = np.column_stack([times, poses])
-    finite = np.isfinite(cells).all(axis=1)
+    finite: NDArray[np.bool_] = np.all(np.isfinite(cells), axis=1)
     # Programs that lost track also write a quaternion of zeros.
-    bad = ~finite | (poses[:, 3:] == 0).all(axis=1)
+    bad: NDArray[np.bool_] = ~finite | np.all(poses[:, 3:] == 0, axis=1)
 
     def error(row: int) -> FileError:
         if finite[row]:
@@ -102,7 +102,7 @@ def _new(
     if context.repeated_times or not again.any():
         return ~again
     same = np.concatenate([[False], (poses[1:] == poses[:-1]).all(axis=1)])
-    repeated = again & same
+    repeated: NDArray[np.bool_] = again & same
 
     def error(row: int) -> FileError:
         message = f"time {times[row].item()!r} repeats {times[row - 1].item()!r}"
