@@ -11,8 +11,9 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+from dqslam.io.bag_limits import check_bag
 from dqslam.io.files import FileError
-from dqslam.io.formats import Look, Progress, no_progress
+from dqslam.io.formats import MOST_QUOTED, Look, Progress, no_progress
 
 NAME = "rosbag"
 LOOKS = "a .bag, .mcap or .db3 file, or a folder with metadata.yaml"
@@ -91,6 +92,7 @@ def _opened(path: str | Path) -> Iterator[Any]:
         ) from None
     if not Path(path).exists():
         raise FileError(path, "no such file")
+    check_bag(path)
     try:
         with AnyReader([Path(path)], default_typestore=_typestore()) as bag:
             yield bag
@@ -98,7 +100,7 @@ def _opened(path: str | Path) -> Iterator[Any]:
         raise
     except Exception as error:
         # A broken bag can fail in rosbags, in sqlite or in a codec, and each has its own errors.
-        raise FileError(path, f"is no bag that can be read: {error}") from error
+        raise FileError(path, f"is no bag that can be read: {str(error)[:MOST_QUOTED]}") from error
 
 
 def _topics(bag: Any) -> list[tuple[str, str]]:

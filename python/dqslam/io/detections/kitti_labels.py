@@ -2,8 +2,9 @@
 
 Tracking is one file with ``frame id class truncated occluded alpha left top right bottom h w l x y
 z rotation [score]`` in a line, frames from 0. Objects are a folder with a file for each image,
-named by its number, without ``frame`` and ``id``. Corners are in pixels from 0, with whole numbers at
-pixel centers, as KITTI's cameras have them. ``DontCare`` regions are left out. There are no times.
+named by its number, without ``frame`` and ``id``. Corners are in pixels from 0, with whole numbers
+at pixel centers, as KITTI's cameras have them. ``DontCare`` regions are left out. There are no
+times.
 """
 
 from __future__ import annotations

@@ -37,7 +37,8 @@ LARGEST_CLASS = 9999  #: limits classes.txt, which has a line for every number u
 
 def read_yolo(path: str | Path, context: ReadContext) -> DetectionTable:
     """Read boxes, unchecked."""
-    if context.size is None:
+    size = context.size
+    if size is None:
         message = "yolo's boxes are shares of the image: give its size with --camera"
         raise FileError(path, message)
     folder = Path(path)
@@ -45,7 +46,6 @@ def read_yolo(path: str | Path, context: ReadContext) -> DetectionTable:
         raise FileError(path, "is no folder of .txt files")
     if context.frames is None and (folder / TIMES).is_file():
         context = replace(context, frames=read_frame_times(folder / TIMES))
-    size = context.size
     lines = _lines(folder, context)
     if not lines:
         raise FileError(folder, "holds no boxes")

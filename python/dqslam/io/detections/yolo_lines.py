@@ -143,7 +143,7 @@ def _key_points(values: Floats) -> int | None:
                 points[..., :2] <= box[:, None, 2:] + BEYOND
             )
             if seen.any() and np.mean(np.all(inside, axis=2)[seen]) >= IN_BOX:
-                return 4 + count
+                return int(4 + count)
     return None
 
 
