@@ -35,6 +35,7 @@ from dqslam.io.detections.records import Records, make_table
 from dqslam.io.detections.table import NO_SCORE, DetectionTable
 from dqslam.io.files import FileError, parse_floats, write_text
 from dqslam.io.formats import Format, Look, ReadContext, look_at
+from dqslam.io.times import parse_times
 
 CORNER = 0.5  #: other programs' pixel coordinates minus ours
 COLUMNS = ("frame", "timestamp", *CORNERS, "score", "class_id", "class_name")
@@ -65,7 +66,7 @@ def read_csv(path: str | Path, context: ReadContext) -> DetectionTable:
         box=_boxes(cells, edges, [names[name] for name in edges]),
         frame=cells.integers(names["frame"]) if numbered else None,
         image=cells.cells(names["image"]) if "image" in names and not numbered else None,
-        time=_floats(cells, names["timestamp"]) if "timestamp" in names else None,
+        time=_times(cells, names["timestamp"], context) if "timestamp" in names else None,
         score=_floats(cells, names["score"], NO_SCORE) if "score" in names else None,
         class_id=labels("class_id"),
         class_name=labels("class_name"),
@@ -80,6 +81,11 @@ def _boxes(cells: CsvTable, edges: Sequence[str], names: Sequence[str]) -> Float
     if edges == SIZES:
         box[:, 2:] += box[:, :2]
     return box - CORNER if counted_from_corner(names) else box
+
+
+def _times(cells: CsvTable, name: str, context: ReadContext) -> Floats:
+    texts = [cell or "nan" for cell in cells.cells(name)]
+    return parse_times(cells.path, name, texts, cells.lines, context.notes)
 
 
 def _floats(cells: CsvTable, name: str, empty: float = float("nan")) -> Floats:
