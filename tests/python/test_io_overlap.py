@@ -27,8 +27,8 @@ def boxes(tmp_path, scores, frames=3, classes=(0, 1, 2, 3)):
         ((0.9, 0.8, 0.7, 0.6), 0.5, [0, 3]),
         ((0.9, 0.8, 0.7, 0.6), 0.7, [0, 2, 3]),
         ((0.9, 0.8, 0.7, 0.6), 0.9, [0, 1, 2, 3]),
-        # The first overlaps the second, which goes because of it or of the third.
-        ((0.7, 0.8, 0.9, 0.6), 0.7, [2, 3]),
+        # The first overlaps the second, which is gone because of the third.
+        ((0.7, 0.8, 0.9, 0.6), 0.7, [0, 2, 3]),
         ((0.5, 0.5, 0.5, 0.5), 0.5, [0, 3]),
     ],
 )

@@ -97,7 +97,7 @@ def test_files_of_line_ends_are_images_without_boxes(tmp_path):
         ("0 0.5 0.5 0.2\n", r":1: 4 fields, not 5 to 7"),
         (
             "0 0.5 0.5 0.2 0.1\n0 0.1 0.1 0.2 0.1 0.2 0.3 0.1 0.3\n",
-            r":1: 5 fields, but other lines",
+            r":1: 5 fields, but",
         ),
     ],
 )
