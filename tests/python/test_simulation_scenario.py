@@ -157,3 +157,16 @@ def test_a_world_of_the_battery_differs_from_its_base_where_it_says():
         assert (world.odometry != loop.odometry) == (section == "odometry")
         assert (world.detector != loop.detector) == (section == "detector")
         assert (world.calibration != loop.calibration) == (section == "")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("laps = 2", "laps = 1_000_000_000", r"laps: .*less than or equal to 1000000"),
+        ("step_m = 0.5 ", "step_m = 1e-12 ", "the path has .* steps, more than 10000000"),
+        ("object_count = 10", "object_count = 1e12", "object_count: .*less than or equal to 10000"),
+    ],
+)
+def test_numbers_that_would_fill_the_memory(tmp_path, old, new, message):
+    with pytest.raises(ValueError, match=message):
+        load_scenario(str(written(tmp_path, old, new)))

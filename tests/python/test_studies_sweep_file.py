@@ -219,3 +219,24 @@ def test_the_page_shows_a_file_that_is_right_and_has_all_metrics(write):
     assert len(sweep.cells) * len(sweep.seeds) == 3000
     for name in trial_module.METRICS:
         assert f"`{name}`" in PAGE
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (
+            "trials = 1_000_000_000_000",
+            r":2: trials: Input should be less than or equal to 1000000",
+        ),
+        ("trials = 1e12", r":2: trials: Input should be less than or equal to 1000000"),
+        ("samples = 10_000_000\n[random]\nx = { low = 0.0, high = 1.0 }", r":2: samples: Input"),
+        (
+            "samples = 1_000_000\n[grid]\nestimator.loss = ['none', 'dcs']\n"
+            "[random]\nscenario.odometry.rotation_sigma_rad = { low = 0.01, high = 0.03 }",
+            "it has 2000000 cells, more than 1000000",
+        ),
+    ],
+)
+def test_numbers_that_would_fill_the_memory(write, text, message):
+    with pytest.raises(FileError, match=message):
+        load_sweep(write(f'scenario = "paper"\n{text}\n'))

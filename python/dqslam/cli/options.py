@@ -52,7 +52,7 @@ Nms = Annotated[
     typer.Option(
         metavar="IOU",
         help="Leave out boxes that overlap a better one of their image by this, 0 to 1, of any "
-        "class.",
+        "class. Default: leave out none.",
     ),
 ]
 Topics = Annotated[
