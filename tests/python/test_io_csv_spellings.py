@@ -99,3 +99,18 @@ def test_a_wide_header_takes_no_time_that_grows_with_its_square(tmp_path):
     text = ",".join(["timestamp", "x1", "y1", "x2", "y2", *names])
     table = read(tmp_path, f"{text}\n0,1,2,3,4{',0' * len(names)}\n", notes=Notes())
     assert len(table.columns) == 20005
+
+
+def test_a_frame_has_one_image(tmp_path):
+    text = "frame,image,x1,y1,x2,y2\n0,left/1.png,1,2,3,4\n0,{},1,2,3,4\n"
+    assert read(tmp_path, text.format("left/1.png"), frames=HZ).frame.tolist() == [0, 0]
+    with pytest.raises(FileError, match=r":3: two images are frame 0: left/1.png and right/1.png"):
+        read(tmp_path, text.format("right/1.png"), frames=HZ)
+
+
+def test_names_that_contradict_those_asked_for_are_noted(tmp_path):
+    text = "timestamp,x1,y1,x2,y2,class,name\n0,1,2,3,4,5,cup\n"
+    notes = Notes()
+    table = read(tmp_path, text, classes={5: "jar"}, notes=notes)
+    assert table.class_name == ("jar",)
+    assert "class 5 is cup here, and is called jar as asked for" in notes.sentences()[0]

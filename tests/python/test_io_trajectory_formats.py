@@ -126,7 +126,8 @@ def test_formats_by_name(tmp_path):
     with pytest.raises(FileError, match=r":1: 8 fields, not the 12"):
         read_trajectory(path, "kitti", frames=frame_rate(1))
     with pytest.raises(
-        ValueError, match="'coco' is none of trajectory formats: rosbag, euroc, tum, kitti"
+        ValueError,
+        match="'coco' is none of trajectory formats: rosbag, colmap-images, euroc, tum, kitti",
     ):
         read_trajectory(path, "coco")
     with pytest.raises(ValueError, match="topic /odom: only bags have topics, not tum"):

@@ -22,6 +22,10 @@ def read(tmp_path, text, name="path.txt", **more):
     "text",
     [
         "# timestamp tx ty tz qw qx qy qz\n5 1 2 3 0.6 0 0 0.8\n",
+        "# format: timestamp tx ty tz qw qx qy qz (s, m)\n5 1 2 3 0.6 0 0 0.8\n",
+        "# quaternions are w x y z\n5 1 2 3 0.6 0 0 0.8\n",
+        "# poses, w-first\n5 1 2 3 0.6 0 0 0.8\n",
+        "# t tx ty tz qx qy qz qw id\n5 1 2 3 0 0 0.8 0.6 9\n",
         "# made by hand\n# timestamp tx ty tz qw qx qy qz\n5 1 2 3 0.6 0 0 0.8\n",
         "timestamp,tx,ty,tz,qx,qy,qz,qw\n5,1,2,3,0,0,0.8,0.6\n",
         "time;x;y;z;q_w;q_x;q_y;q_z\n5;1;2;3;0.6;0;0;0.8\n",
@@ -105,7 +109,11 @@ def test_a_matrix_with_another_last_row(tmp_path):
 
 
 def colmap(*images, points="1.5 2.5 -1 3.5 4.5 77"):
-    lines = ["# Image list with two lines of data per image:"]
+    lines = [
+        "# Image list with two lines of data per image:",
+        "#   IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME",
+        "#   POINTS2D[] as (X, Y, POINT3D_ID)",
+    ]
     for number, name, turn, place in images:
         w_first = turn.as_quat()[[3, 0, 1, 2]]
         cells = " ".join(f"{value:.17g}" for value in (*w_first, *place))
@@ -135,7 +143,7 @@ def test_colmap_images_have_the_times_of_their_names(tmp_path):
     times, poses = read(tmp_path, colmap(*images), "images.txt", frames=frames)
     assert times.tolist() == [3.5, 3.75]
     assert poses[:, 2].tolist() == [0, -1]
-    with pytest.raises(FileError, match=r"images\.txt:2: a\.png: its name is no number"):
+    with pytest.raises(FileError, match=r"images\.txt:4: a\.png: its name is no number"):
         read(tmp_path, colmap(*images), "images.txt", frames=HZ)
     timed = [(1, "2.5.png", one, (0, 0, 0)), (2, "2.25.png", one, (0, 0, 1))]
     assert read(tmp_path, colmap(*timed), "images.txt").timestamps.tolist() == [2.25, 2.5]
@@ -143,6 +151,6 @@ def test_colmap_images_have_the_times_of_their_names(tmp_path):
 
 def test_images_of_two_cameras_are_refused(tmp_path):
     text = colmap((1, "1.png", Rotation.identity(), (0, 0, 0)))
-    text += text.split("\n")[1].replace("1 1.png", "2 2.png") + "\n\n"
+    text += text.split("\n")[3].replace("1 1.png", "2 2.png") + "\n\n"
     with pytest.raises(FileError, match="its images are of 2 cameras, not of one"):
         read(tmp_path, text, "images.txt", frames=HZ)

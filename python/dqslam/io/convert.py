@@ -24,6 +24,7 @@ from dqslam.io.rosbag import bag_topics
 from dqslam.io.sources import KINDS, kind_of
 from dqslam.io.trajectory import TRAJECTORY_FORMATS, Trajectory, read_trajectory
 from dqslam.io.trajectory.rosbag import KINDS as TRAJECTORIES
+from dqslam.io.trajectory.tf import STATIC
 
 FORMATS: dict[str, tuple[Format[Any], ...]] = {
     "camera": CAMERA_FORMATS,
@@ -97,7 +98,8 @@ def convert(
         topic = _topics_by_kind(source, topics).get(kind) if topics else None
         return _convert(source, out, kind, format, target, topic, context, progress)
     named = _topics_by_kind(source, topics)
-    there = set(bag_topics(source).values())
+    # Transforms that do not move are no trajectory.
+    there = {kind for name, kind in bag_topics(source).items() if not name.endswith(STATIC)}
     kinds = [kind for kind, (messages, *_) in FROM_BAG.items() if there & set(messages)]
     if not kinds:
         known = ", ".join(message for messages, *_ in FROM_BAG.values() for message in messages)

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from dqslam._input import plain_name
 from dqslam.io.files import FileError, parse_numbers, read_rows, read_text
 from dqslam.io.yaml import parse_yaml
 
@@ -23,7 +24,7 @@ def read_mount(path: str | Path) -> NDArray[np.float64]:
     """Read body_from_camera, shape (7,): m, unit quaternion x y z w."""
     from scipy.spatial.transform import Rotation
 
-    if Path(path).suffix.lower() in (".yaml", ".yml"):
+    if Path(plain_name(path)).suffix.lower() in (".yaml", ".yml"):
         entry = parse_yaml(path, read_text(path)).get("T_BS")
         data = entry.get("data") if isinstance(entry, dict) else entry
         if not isinstance(data, list):

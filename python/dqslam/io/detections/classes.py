@@ -51,10 +51,16 @@ def number_classes(
         raise error(wrong.row, f"class_id is {wrong.label}, not a whole number") from None
     given = context.classes or {}
     class_name = []
+    others: dict[int, str] = {}
     for row, (number, label) in enumerate(zip(class_id.tolist(), labels, strict=True)):
         own = table.get(label.strip(), "" if names is None else names[row])
         bare = NO_CLASS if is_none(label) else label.strip()
         class_name.append(given.get(number) or own or bare)
+        if own and number in given and given[number] != own:
+            others[number] = own
+    for number, own in others.items():
+        message = f"class {number} is {own} here, and is called {given[number]} as asked for"
+        context.notes.doubt(path, message)
     if ids is not None:
         class_id = _apart(path, class_id, class_name, given, context)
     return class_id, tuple(class_name)

@@ -58,14 +58,12 @@ def read_csv(path: str | Path, context: ReadContext) -> DetectionTable:
     def labels(name: str) -> tuple[str, ...] | None:
         return cells.cells(names[name]) if name in names else None
 
-    # Numbers of frames go before names of images.
-    numbered = "frame" in names
     records = Records(
         columns=tuple(cells.columns),
         line=cells.lines,
         box=_boxes(cells, edges, [names[name] for name in edges]),
-        frame=cells.integers(names["frame"]) if numbered else None,
-        image=cells.cells(names["image"]) if "image" in names and not numbered else None,
+        frame=cells.integers(names["frame"]) if "frame" in names else None,
+        image=labels("image"),
         time=_times(cells, names["timestamp"], context) if "timestamp" in names else None,
         score=_floats(cells, names["score"], NO_SCORE) if "score" in names else None,
         class_id=labels("class_id"),

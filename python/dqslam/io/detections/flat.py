@@ -84,7 +84,7 @@ def flat_table(
         line=[entry.line for entry in entries],
         box=box - CORNER if counted_from_corner(spelled) else box,
         frame=frame,
-        image=labels("image") if frame is None else None,
+        image=labels("image"),
         time=numbers("timestamp", None),
         score=numbers("score", NO_SCORE),
         class_id=labels("class_id"),

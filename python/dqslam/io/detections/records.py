@@ -26,7 +26,7 @@ class Records:
 
     ``box`` (m, 4) px, corners in this package's convention, NaN where the file has no number;
     ``frame`` (m,) as the file counts; ``time`` (m,) s and ``score`` (m,), NaN where it has none;
-    ``image`` (m,) the name of the image, if it tells the frame or the time;
+    ``image`` (m,) the name of the image, which tells the frame or the time if there is no frame;
     ``class_id``, ``class_name``, ``track_id`` (m,) as the file has them.
     """
 
@@ -117,7 +117,9 @@ def _with_numbers(table: DetectionTable, context: ReadContext) -> DetectionTable
 
 def _frames(path: str | Path, records: Records, context: ReadContext) -> tuple[Ints, Floats | None]:
     """Return the frame of each box, from 0, and its time if the name of the image is one."""
-    if records.image is not None:
+    if records.image is not None and records.frame is not None:
+        _check_images(path, records, records.frame, records.image)
+    if records.image is not None and records.frame is None:
         if context.frames is not None and context.frames.names:
             return _looked_up(path, records, records.image, context.frames), None
         frame, time = _named(path, records, records.image)
@@ -141,6 +143,15 @@ def _frames(path: str | Path, records: Records, context: ReadContext) -> tuple[I
         message = f"frame {frame[early[0]]} is before the first one, {first}"
         raise records.error(path, int(early[0]), message)
     return frame - first, None
+
+
+def _check_images(path: str | Path, records: Records, frame: Ints, images: Sequence[str]) -> None:
+    """Refuse a frame that has two images."""
+    names: dict[int, str] = {}
+    for row, (number, image) in enumerate(zip(frame.tolist(), images, strict=True)):
+        if names.setdefault(number, image) != image:
+            message = f"two images are frame {number}: {names[number]} and {image}"
+            raise records.error(path, row, message)
 
 
 def _named(path: str | Path, records: Records, images: Sequence[str]) -> tuple[Ints, Floats | None]:

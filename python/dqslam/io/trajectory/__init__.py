@@ -23,7 +23,7 @@ from dqslam.io.trajectory.tum import write_tum as write_trajectory
 __all__ = ["TRAJECTORY_FORMATS", "Trajectory", "read_trajectory", "write_trajectory"]
 
 # A file is of the first of these that it looks like.
-TRAJECTORY_FORMATS = (BAG_TRAJECTORY, EUROC, TUM, KITTI, KITTI_360, COLMAP_IMAGES)
+TRAJECTORY_FORMATS = (BAG_TRAJECTORY, COLMAP_IMAGES, EUROC, TUM, KITTI, KITTI_360)
 
 
 def read_trajectory(

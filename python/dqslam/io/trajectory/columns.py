@@ -49,15 +49,17 @@ def read_columns(path: str | Path, context: ReadContext) -> Trajectory:
     if missing:
         raise FileError(path, f"its header has no {', '.join(missing)}")
     cells = [split_row(row) for row in rows]
-    count = header.count
+    count, others = header.count, header.others
     if header is PLAIN and len(cells[0]) == WITH_ID:
         count = WITH_ID
+    elif header.words and len(cells[0]) == len(FIELDS):
+        count, others = len(FIELDS), ()
     for row, line in zip(cells, lines, strict=True):
         if len(row) != count:
             raise FileError(path, f"{len(row)} fields, not {count}: {' '.join(FIELDS)}", line)
-    others = [name for name in header.others if name.lower() not in SILENT]
-    if others:
-        context.notes.doubt(path, f"not used: {', '.join(others[:12])}")
+    unused = [name for name in others if name.lower() not in SILENT]
+    if unused:
+        context.notes.doubt(path, f"not used: {', '.join(unused[:12])}")
     stamps = [row[header.columns["t"]] for row in cells]
     times = _times(path, header, stamps, lines, context.notes)
     poses = [

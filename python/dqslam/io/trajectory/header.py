@@ -1,7 +1,9 @@
 """Headers of trajectories: the names of columns, in a comment or in the first row.
 
 A header that names the four parts of a quaternion is believed: it says which column is which, and
-units in brackets. Any other comment is prose.
+units in brackets. A comment may have other words around these names, as in "format: t tx ty tz qx
+qy qz qw (m, s)". A comment that only says that w is first, "wxyz", is believed, too. Any other
+comment is prose.
 """
 
 from __future__ import annotations
@@ -23,6 +25,8 @@ SPELLINGS = {
 UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "m": 1.0, "cm": 1e-2, "mm": 1e-3, "": 1.0}
 # Names of ends of times, which are not in brackets.
 TIME_UNITS = {"_ns": "ns", "_us": "us", "_ms": "ms", "_nsec": "ns"}
+FIELDS_W_FIRST = ("t", "tx", "ty", "tz", "qw", "qx", "qy", "qz")
+W_FIRST = re.compile(r"(?i)\bw ?,? ?x ?,? ?y ?,? ?z\b|\bw[- ]first\b")
 QUATERNION = {"qx", "qy", "qz", "qw"}
 
 
@@ -34,6 +38,7 @@ class Header:
     units: dict[str, str]
     count: int  #: number of columns
     others: tuple[str, ...]  #: names that mean nothing here
+    words: bool = False  #: whether these may be words after the names, and no columns
 
 
 def _meanings() -> dict[str, str]:
@@ -54,7 +59,8 @@ def parse_header(text: str) -> Header | None:
     It may be separated by commas, semicolons, or spaces.
     """
     text = text.strip().lstrip("#%/").strip()
-    separator = next((one for one in (",", ";", "\t") if one in text), None)
+    # There are at least seven names, and a word or two may have commas.
+    separator = next((one for one in (",", ";", "\t") if text.count(one) >= 6), None)
     # A unit may be apart from its name: "p_RS_R_x [m]".
     names = text.split(separator) if separator else re.sub(r"\s+[\[(]", "[", text).split()
     columns: dict[str, int] = {}
@@ -79,11 +85,30 @@ def parse_header(text: str) -> Header | None:
 
 def find_header(comments: Sequence[str], first: str) -> Header | None:
     """Return the header in the first row, or else in the last comment that is one."""
-    for text in (first, *reversed(comments)):
+    header = parse_header(first)
+    if header is not None:
+        return header
+    for text in reversed(comments):
         header = parse_header(text)
         if header is not None:
-            return header
+            return _without_words(header)
+    if any(W_FIRST.search(text) for text in comments):
+        columns = dict(zip(FIELDS_W_FIRST, range(len(FIELDS)), strict=True))
+        return Header(columns, {}, len(FIELDS), ())
     return None
+
+
+def _without_words(header: Header) -> Header:
+    """Return the header of a comment without the words before its names.
+
+    Words after them may be names of columns, or not.
+    """
+    places = sorted(header.columns.values())
+    if len(header.columns) < len(FIELDS) or places[-1] - places[0] >= len(FIELDS):
+        return header
+    columns = {name: place - places[0] for name, place in header.columns.items()}
+    after = header.others[places[0] :]
+    return Header(columns, header.units, len(FIELDS) + len(after), after, words=bool(after))
 
 
 def unit_of(path: str | Path, header: Header, name: str) -> float:
