@@ -22,6 +22,10 @@ _BLOCK = 2**20
 _GZIP = 31  # zlib's name for a stream with the header of gzip
 
 
+class InputWarning(UserWarning):
+    """What a reader left out of a file, or doubts in it, if nobody collects its notes."""
+
+
 def is_stdin(path: str | Path) -> bool:
     """Return whether a path stands for standard input."""
     return str(path) == STDIN

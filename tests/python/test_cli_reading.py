@@ -124,3 +124,18 @@ def test_the_first_frame_and_suppression_in_convert(tmp_path, capsys):
     rows = [line.split(",") for line in out.read_text().splitlines()[1:]]
     assert [(row[0], row[1], row[6]) for row in rows] == [("0", "0.0", "0.9"), ("1", "0.1", "0.7")]
     assert "1 of 3 boxes left out" in capsys.readouterr().err
+
+
+def test_what_other_commands_find_in_a_file_is_one_line(files, orbit, tmp_path, capsys):
+    out = tmp_path / "out"
+    assert call("run", files, "--out", str(out), "--ids", "class_id", "--quiet") == 0
+    truth = tmp_path / "truth.txt"
+    rows = files[1].read_text().splitlines()
+    rows[5] = rows[5].split()[0] + " nan" * 7
+    truth.write_text("\n".join(rows) + "\n")
+    capsys.readouterr()
+    assert main(["evaluate", str(out), "--groundtruth", str(truth), "--quiet"]) == 0
+    error = capsys.readouterr().err
+    assert error.startswith("warning: ")
+    assert "1 of 40 poses left out" in error
+    assert error.count("\n") == 1

@@ -4,12 +4,15 @@ The modules import heavy packages only inside functions, so that `dqslam --help`
 """
 
 import sys
+import warnings
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Annotated, Any
 
 import typer
 
 from dqslam._files import FileErrors
+from dqslam._input import InputWarning
 from dqslam._version import version
 from dqslam.cli.ablation import ablation
 from dqslam.cli.convert import convert
@@ -80,6 +83,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Bad input gives one line on stderr, and a file of settings one line for each mistake. A mistake
     in dqslam itself keeps its traceback.
     """
+    show = warnings.showwarning
+    warnings.showwarning = partial(_show_warning, show)
     try:
         code = app(arguments, prog_name="dqslam", standalone_mode=False) or 0
     except (KeyboardInterrupt, typer.Abort):
@@ -90,9 +95,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
             if mistake:  # a bare `dqslam` has already shown its help
                 _say(mistake)
         code = _BAD_INPUT
+    finally:
+        warnings.showwarning = show
     if code == _INTERRUPTED:
         _say("stopped")
     return int(code)
+
+
+def _show_warning(show: Any, message: Any, category: type[Warning], *where: Any) -> None:
+    """Show what a reader says of a file as one line, and other warnings as Python does."""
+    if issubclass(category, InputWarning):
+        print("warning:", " ".join(str(message).split()), file=sys.stderr)  # noqa: T201
+    else:
+        show(message, category, *where)
 
 
 def _say(message: str) -> None:

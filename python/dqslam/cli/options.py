@@ -9,9 +9,9 @@ if TYPE_CHECKING:
     from dqslam.io import FrameTimes, ReadOptions
 
 CameraFile = Annotated[Path, typer.Option(help="Camera file: JSON, TOML, ROS, COLMAP, KITTI, bag.")]
-OdometryFile = Annotated[Path, typer.Option(help="Trajectory file: TUM, KITTI, EuRoC, bag.")]
+OdometryFile = Annotated[Path, typer.Option(help="Trajectory: TUM, KITTI, EuRoC, COLMAP, bag, ...")]
 DetectionFile = Annotated[
-    Path, typer.Option(help="File or folder of boxes: CSV, COCO, YOLO, MOT, bag.")
+    Path, typer.Option(help="File or folder of boxes: CSV, COCO, YOLO, MOT, KITTI, bag, ...")
 ]
 Formats = Annotated[
     list[str] | None,

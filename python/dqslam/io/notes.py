@@ -8,13 +8,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from dqslam._input import InputWarning as InputWarning
 from dqslam.io.files import FileError
 
 MAX_BAD = 0.05  #: the largest share of bad records that is left out by default
-
-
-class InputWarning(UserWarning):
-    """What a reader left out of a file, or doubts in it, if nobody collects its notes."""
 
 
 @dataclass(frozen=True)
