@@ -122,3 +122,9 @@ def test_the_first_frame_is_an_option(tmp_path):
     assert table.timestamp.tolist() == [0, 0.1]
     with pytest.raises(FileError, match=r"clip_1\.txt:1: frame 1 is before the first one, 2"):
         read_detections(tmp_path / "labels", **SIZE, frames=HZ, first_frame=2)
+
+
+def test_the_folder_above_the_labels_is_a_hint(tmp_path):
+    (tmp_path / "track" / "labels").mkdir(parents=True)
+    with pytest.raises(FileError, match=r"Is a directory; its folder .*track/labels may be what"):
+        read_detections(tmp_path / "track", **SIZE)

@@ -99,7 +99,9 @@ def choose_format(
         if guarded(path, format_.name, format_.recognize, look):
             return format_
     if look.path.is_dir():
-        raise FileError(path, "cannot be read: Is a directory")
+        inner = look.path / "labels"  # as Ultralytics leaves them
+        hint = f"; its folder {inner} may be what is meant" if inner.is_dir() else ""
+        raise FileError(path, f"cannot be read: Is a directory{hint}")
     if look.first == "":
         read_rows(path)  # names what is wrong: empty, comments only, or no text
     tried = "; ".join(f"{format_.name}: {format_.looks}" for format_ in formats)
