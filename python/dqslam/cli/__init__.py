@@ -5,7 +5,8 @@ The modules import heavy packages only inside functions, so that `dqslam --help`
 
 import sys
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from functools import partial
 from typing import Annotated, Any
 
@@ -83,10 +84,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Bad input gives one line on stderr, and a file of settings one line for each mistake. A mistake
     in dqslam itself keeps its traceback.
     """
-    show = warnings.showwarning
-    warnings.showwarning = partial(_show_warning, show)
     try:
-        code = app(arguments, prog_name="dqslam", standalone_mode=False) or 0
+        with _warnings_as_lines():
+            code = app(arguments, prog_name="dqslam", standalone_mode=False) or 0
     except (KeyboardInterrupt, typer.Abort):
         code = _INTERRUPTED
     except (_UsageError, ValueError, OSError, RuntimeError) as error:
@@ -95,11 +95,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
             if mistake:  # a bare `dqslam` has already shown its help
                 _say(mistake)
         code = _BAD_INPUT
-    finally:
-        warnings.showwarning = show
     if code == _INTERRUPTED:
         _say("stopped")
     return int(code)
+
+
+@contextmanager
+def _warnings_as_lines() -> Iterator[None]:
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", InputWarning)
+        warnings.showwarning = partial(_show_warning, warnings.showwarning)
+        yield
 
 
 def _show_warning(show: Any, message: Any, category: type[Warning], *where: Any) -> None:
