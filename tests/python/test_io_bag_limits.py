@@ -4,7 +4,7 @@ import struct
 
 import pytest
 
-from dqslam.io import FileError, read_trajectory
+from dqslam.io import FileError, bag_limits, read_trajectory
 
 pytest.importorskip("rosbags", reason="rosbags is not installed: pip install 'dqslam[rosbag]'")
 lz4 = pytest.importorskip("lz4.frame")
@@ -77,3 +77,17 @@ def test_metadata_is_plain_yaml(tmp_path):
     (tmp_path / "metadata.yaml").write_text("a: &a [1, 2]\nb: [*a, *a]\n")
     with pytest.raises(FileError, match=r"metadata\.yaml:2: has an alias, \*a"):
         read_trajectory(tmp_path)
+
+
+def test_a_packed_bag_that_unpacks_to_far_more(tmp_path, monkeypatch):
+    zstd = pytest.importorskip("backports.zstd")
+    monkeypatch.setattr(bag_limits, "MOST_UNPACKED", 2**20)
+    (tmp_path / "metadata.yaml").write_text("a: 1\n")
+    (tmp_path / "a.db3.zstd").write_bytes(zstd.compress(b"0" * 2**24))
+    with pytest.raises(FileError, match=r"a\.db3\.zstd: unpacks to more than 1048576 bytes"):
+        bag_limits.check_bag(tmp_path)
+    (tmp_path / "a.db3.zstd").write_bytes(zstd.compress(b"0" * 2**19))
+    bag_limits.check_bag(tmp_path)
+    (tmp_path / "a.db3.zstd").write_bytes(b"no zstd")
+    with pytest.raises(FileError, match="is no bag that can be read"):
+        bag_limits.check_bag(tmp_path)

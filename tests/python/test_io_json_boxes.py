@@ -183,3 +183,29 @@ def test_json_lines(tmp_path):
     assert table.frame.tolist() == [0, 1]
     with pytest.raises(FileError, match=r"boxes\.jsonl:2: not JSON"):
         read(tmp_path, text[:-1], "boxes.jsonl")
+
+
+@pytest.mark.parametrize("key", ["frame", "frame_id", "file_name"])
+def test_entries_without_an_image_id(tmp_path, key):
+    entry = {name: value for name, value in ENTRY.items() if name != "image_id"}
+    value = "rgb/6.png" if key == "file_name" else 6
+    table = read(tmp_path, [entry | {key: value}])
+    assert table.frame.tolist() == [6]
+    with pytest.raises(FileError, match="missing image_id"):
+        read(tmp_path, [entry])
+
+
+def test_lines_of_images_with_their_boxes(tmp_path):
+    box = {"x1": 10, "y1": 20, "x2": 40, "y2": 60, "label": "cup"}
+    lines = [{"frame": i, "timestamp": i / 2, "detections": [box] * i} for i in range(3)]
+    table = read(tmp_path, "\n".join(map(json.dumps, lines)), "boxes.jsonl", frames=None)
+    assert table.frame.tolist() == [1, 2, 2]
+    assert table.timestamp.tolist() == [0.5, 1, 1]
+    assert table.line.tolist() == [2, 3, 3]
+    assert table.class_name == ("cup",) * 3
+    lines[0]["detections"] = [[10, 20, 40, 60]]
+    with pytest.raises(FileError, match=r":1: entry 0: detections is no list of tables"):
+        read(tmp_path, "\n".join(map(json.dumps, lines)), "boxes.jsonl", frames=None)
+    lines[0]["detections"] = [{"bbox": [10, 20, 40, 60]}]
+    with pytest.raises(FileError, match="bbox is a list: are these corners or sizes. name them"):
+        read(tmp_path, "\n".join(map(json.dumps, lines)), "boxes.jsonl", frames=None)

@@ -20,6 +20,9 @@ from dqslam.io.files import FileError, read_text
 from dqslam.io.yaml import parse_yaml
 
 MOST_UNPACKED = 2**30  #: bytes of a chunk
+MOST_FACTOR = 200  #: of a packed file, beyond that
+PACKED = (".zstd", ".zst")  #: endings of packed files of rosbag2
+BLOCK = 2**20
 MCAP, ROS_1 = b"\x89MCAP0\r\n", b"#ROSBAG V2.0\n"
 MCAP_CHUNK, ROS_1_CHUNK = 6, 5  #: kinds of records
 MOST_HEADER = 2**20  #: bytes of the header of a record of ROS 1
@@ -48,7 +51,7 @@ def check_bag(path: str | Path) -> None:
         if metadata.is_file():
             with contextlib.suppress(RuntimeError):  # PyYAML may not be installed
                 parse_yaml(metadata, read_text(metadata))
-        files = sorted(file for file in path.iterdir() if file.suffix == ".mcap")
+        files = sorted(file for file in path.iterdir() if file.suffix in (".mcap", *PACKED))
     else:
         files = [path]
     for file in files:
@@ -60,6 +63,9 @@ def check_bag(path: str | Path) -> None:
 def _check_file(path: Path, size: int, modified: int) -> None:
     """Check a file once, as a bag is opened for each kind of messages."""
     with path.open("rb") as data:
+        if path.suffix in PACKED:
+            _check_packed(path, data, size)
+            return
         start = data.read(len(ROS_1))
         chunks: Iterator[Chunk] = iter(())
         if start.startswith(MCAP):
@@ -107,6 +113,31 @@ def _ros_1_chunks(path: Path, data: BinaryIO, size: int) -> Iterator[Chunk]:
         at = start + length
 
 
+def _check_packed(path: Path, data: BinaryIO, size: int) -> None:
+    """Refuse a packed file that unpacks to far more than its size and 1 GiB."""
+    most = max(MOST_UNPACKED, MOST_FACTOR * size)
+    unpack, found = _zstd().ZstdDecompressor(), 0
+    try:
+        while not unpack.eof and found <= most:
+            block = data.read(BLOCK) if unpack.needs_input else b""
+            if not block and unpack.needs_input:
+                break  # its end is missing, which its reader says
+            found += len(unpack.decompress(block, BLOCK))
+    except Exception as error:  # the codec has errors of its own
+        raise FileError(path, f"is no bag that can be read: {str(error)[:200]}") from None
+    if found > most:
+        raise FileError(path, f"unpacks to more than {most} bytes")
+
+
+def _zstd() -> Any:
+    """Return the module that unpacks Zstandard, one that rosbags needs as well."""
+    if sys.version_info >= (3, 14):
+        from compression import zstd
+    else:
+        from backports import zstd
+    return zstd
+
+
 def _check_chunk(path: Path, data: BinaryIO, chunk: Chunk) -> None:
     if chunk.unpacked > MOST_UNPACKED:
         message = f"a chunk declares {chunk.unpacked} bytes, more than {MOST_UNPACKED >> 30} GiB"
@@ -122,11 +153,7 @@ def _check_chunk(path: Path, data: BinaryIO, chunk: Chunk) -> None:
 
         unpack = LZ4FrameDecompressor()
     elif chunk.compression == "zstd":
-        if sys.version_info >= (3, 14):
-            from compression import zstd
-        else:
-            from backports import zstd
-        unpack = zstd.ZstdDecompressor()
+        unpack = _zstd().ZstdDecompressor()
     else:
         return  # its reader does not know it either
     try:

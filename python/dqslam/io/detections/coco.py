@@ -63,7 +63,11 @@ def coco_table(
         raise FileError(path, "holds no boxes but those of crowds")
     keys = dict.fromkeys(key for entry in entries for key in entry.fields)
     known = known_columns(path, (key for key in keys if key not in IGNORED), context.notes)
-    images = coco_images(path, entries, rest.get("images"), context)
+    image_key = next(
+        (key for key in ("image_id", known.get("image"), known.get("frame")) if key in keys),
+        "image_id",
+    )
+    images = coco_images(path, entries, rest.get("images"), image_key or "image_id", context)
     timed = known.get("timestamp")
     scored = known.get("score")
 

@@ -29,26 +29,26 @@ class CocoImages:
 
 
 def coco_images(
-    path: str | Path, entries: Sequence[Entry], images: Any, context: ReadContext
+    path: str | Path, entries: Sequence[Entry], images: Any, key: str, context: ReadContext
 ) -> CocoImages:
-    """Find what tells the frame of each entry.
+    """Find what tells the frame of each entry, by its ``key``, mostly image_id.
 
     Ids of images are arbitrary, so the names of files come first, unless no number in them tells a
     frame. Datasets of videos have the frame itself.
     """
     by_id = _by_id(path, images)
     size = _size(path, by_id.values(), context)
-    ids = [entry.value("image_id") for entry in entries]
+    ids = [entry.value(key) for entry in entries]
     for entry, image in zip(entries, ids, strict=True):
         if isinstance(image, bool) or not isinstance(image, int | float | str):
-            raise entry.error(f"image_id is {image!r}, not a name or a number")
+            raise entry.error(f"{key} is {image!r}, not a name or a number")
     used = [by_id.get(image, {}) for image in ids]
-    key = next((key for key in FRAME_KEYS if used and all(key in one for one in used)), None)
-    if key is not None:
+    video = next((one for one in FRAME_KEYS if used and all(one in image for image in used)), None)
+    if video is not None:
         videos = {one.get("video_id") for one in by_id.values()}
         if len(videos) > 1:
             raise FileError(path, f"its images are of {len(videos)} videos, not of one")
-        return CocoImages(None, _integers(entries, [one[key] for one in used], key), size=size)
+        return CocoImages(None, _integers(entries, [one[video] for one in used], video), size=size)
     if used and all("file_name" in one for one in used):
         names = [str(one["file_name"]) for one in used]
         every = tuple(str(one["file_name"]) for one in by_id.values() if "file_name" in one)
@@ -56,7 +56,7 @@ def coco_images(
             return CocoImages(names, None, every, size)
     if any(isinstance(image, str) for image in ids):
         return CocoImages([str(image) for image in ids], None, size=size)
-    return CocoImages(None, _integers(entries, ids, "image_id"), size=size)
+    return CocoImages(None, _integers(entries, ids, key), size=size)
 
 
 def _tell_frames(

@@ -2,8 +2,10 @@
 
 A box is an object with the names of the CSV format, in any of their spellings (``x_min y_min x_max
 y_max confidence class_id tracker_id``, ...), or with ``box`` or ``bbox`` as a table of these
-(``{"x1": ..}``, as Ultralytics has it). Pixels count as in the CSV format. JSON lines, an object in
-each line, may also be those of COCO, with a list ``bbox`` of x, y, width, height.
+(``{"x1": ..}``, as Ultralytics has it). An object may also be an image with a list ``detections``
+(or ``boxes``, ``objects``, ``predictions``) of boxes. Pixels count as in the CSV format. JSON
+lines, an object in each line, may also be those of COCO, with a list ``bbox`` of x, y, width,
+height.
 """
 
 from __future__ import annotations
@@ -32,6 +34,7 @@ from dqslam.io.files import FileError, read_text
 from dqslam.io.formats import Format, Look, ReadContext
 
 NESTED = ("box", "bbox", "xyxy")
+LISTS = ("detections", "boxes", "objects", "predictions")  #: of an image's boxes
 
 
 def read_flat(path: str | Path, context: ReadContext) -> DetectionTable:
@@ -52,9 +55,9 @@ def flat_table(
     path: str | Path, format_name: str, entries: Sequence[Entry], context: ReadContext
 ) -> DetectionTable:
     """Make a table of objects with the names of the CSV format."""
+    entries = [_flattened(box) for entry in entries for box in _boxes_of(entry)]
     if not entries:
         raise FileError(path, "holds no boxes")
-    entries = [_flattened(entry) for entry in entries]
     keys = dict.fromkeys(key for entry in entries for key in entry.fields)
     names = known_columns(path, keys, context.notes)
     edges = SIZES if not {"x2", "y2"} & set(names) and "width" in names else CORNERS
@@ -92,6 +95,18 @@ def flat_table(
         track_id=labels("track_id"),
     )
     return make_table(path, format_name, records, context)
+
+
+def _boxes_of(entry: Entry) -> list[Entry]:
+    """Return an entry, or, if it is an image with a list of boxes, its boxes with its fields."""
+    key = next((key for key in LISTS if isinstance(entry.fields.get(key), list)), None)
+    if key is None:
+        return [entry]
+    boxes = entry.fields[key]
+    if not all(isinstance(box, dict) for box in boxes):
+        raise entry.error(f"{key} is no list of tables of named values")
+    common = {name: value for name, value in entry.fields.items() if name != key}
+    return [Entry(entry.path, entry.index, entry.line, common | box) for box in boxes]
 
 
 def _flattened(entry: Entry) -> Entry:
