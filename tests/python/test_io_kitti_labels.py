@@ -25,6 +25,7 @@ def test_tracking(tmp_path, end, score):
     assert (table.track_id.tolist(), table.class_name) == ([3, 4], ("Car", "Van"))
     assert (table.score.tolist(), table.line.tolist()) == ([score, score], [1, 3])
     assert notes.left_out[0].reason == "regions DontCare"
+    assert not notes.has_bad  # they are no mistake
 
 
 def test_objects(tmp_path):

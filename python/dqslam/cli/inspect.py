@@ -89,7 +89,7 @@ def inspect(
             lens, path, table, ids=ids, max_time_difference=max_time_difference
         )
     _show(output, inspection, notes)
-    if strict and (inspection.findings or notes.left_out):
+    if strict and (inspection.findings or notes.has_bad):
         raise typer.Exit(FOUND)
 
 

@@ -24,6 +24,7 @@ class LeftOut:
     count: int
     of: int
     first: str  #: the first of them, with its line
+    bad: bool = True  #: False if they are left out because of what they are
 
     def __str__(self) -> str:
         """Return a sentence for people."""
@@ -51,6 +52,11 @@ class Notes:
     def is_strict(self) -> bool:
         """Whether any bad record refuses its file."""
         return self.max_bad == 0
+
+    @property
+    def has_bad(self) -> bool:
+        """Whether bad records were left out."""
+        return any(one.bad for one in self.left_out)
 
     def leave_out(
         self,
@@ -81,7 +87,7 @@ class Notes:
     def skip(self, path: str | Path, what: str, reason: str, count: int, of: int) -> None:
         """Count records that are left out because of what they are; any number of them may be."""
         if count:
-            self.left_out.append(LeftOut(str(path), what, reason, count, of, reason))
+            self.left_out.append(LeftOut(str(path), what, reason, count, of, reason, bad=False))
 
     def doubt(self, path: str | Path, message: str) -> None:
         """Say what is doubtful in a file, once."""
