@@ -86,6 +86,9 @@ def test_one_standard_input_only(files, tmp_path, capsys):
         assert call(command, inputs, *more) == 2
         assert_one_line_of_error(capsys, "standard input can be only one of the inputs")
     assert not (tmp_path / "out").exists()
+    more = ("--groundtruth", "-", "--out", str(tmp_path / "out"))
+    assert call("run", (files[0], files[1], "-"), *more) == 2
+    assert_one_line_of_error(capsys, "standard input can be only one of the inputs")
 
 
 @pytest.mark.parametrize(("text", "code"), [("640x480", 0), ("640x481", 2), ("640", 2)])

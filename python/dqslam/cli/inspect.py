@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from dqslam._input import refuse_shared_input
 from dqslam.cli.options import (
     CameraFile,
     CameraInBody,
@@ -70,6 +71,7 @@ def inspect(
     from dqslam import io
     from dqslam.inspection import inspect_recording
 
+    refuse_shared_input(camera, odometry, detections, frame_times, camera_in_body)
     output = Output(quiet=quiet, as_json=json)
     names = io.split_formats(formats or [])
     with output.steps("inspecting", 3) as done:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from dqslam._input import refuse_shared_input
 from dqslam.cli.options import (
     CameraFile,
     CameraInBody,
@@ -134,6 +135,8 @@ def run(
     from dqslam.assumptions import load_size_priors
     from dqslam.pipeline import RunFilesOptions, run_files
 
+    inputs = (camera, odometry, detections, frame_times, camera_in_body)
+    refuse_shared_input(*inputs, odometry_covariance, groundtruth, size_priors)
     added = parse_noise("--perturb-odometry", perturb_odometry)
     believed = parse_noise("--odometry-noise", odometry_noise)
     if odometry_covariance is not None and (added or believed):
