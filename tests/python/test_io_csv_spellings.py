@@ -51,6 +51,8 @@ def test_images_by_name(tmp_path):
     table = read(tmp_path, text, frames=HZ)
     assert (table.frame[0], table.timestamp[0], table.class_name[0]) == (7, 0.7, "cup")
     np.testing.assert_array_equal(table.box, [[0.5, 1.5, 2.5, 3.5]])
+    with pytest.raises(FileError, match="its images have 320 x 480 px, those of the camera 640 x"):
+        read(tmp_path, text.replace("640", "320"), frames=HZ)
     timed = text.replace("b/7.png", "1311868164.25.png")
     assert read(tmp_path, timed).timestamp[0] == 1311868164.25
 

@@ -69,6 +69,7 @@ def read_csv(path: str | Path, context: ReadContext) -> DetectionTable:
         class_id=labels("class_id"),
         class_name=labels("class_name"),
         track_id=labels("track_id"),
+        image_size=_image_size(cells, names) if edges == CORNERS else None,
     )
     return make_table(path, "csv", records, context)
 
@@ -79,6 +80,20 @@ def _boxes(cells: CsvTable, edges: Sequence[str], names: Sequence[str]) -> Float
     if edges == SIZES:
         box[:, 2:] += box[:, :2]
     return box - CORNER if counted_from_corner(names) else box
+
+
+def _image_size(cells: CsvTable, names: dict[str, str]) -> tuple[int, int] | None:
+    """Return the size of the images if width and height beside an image are alike in all rows.
+
+    Beside corners they may also be those of the box, which differ.
+    """
+    if not {"width", "height", "image"} <= set(names):
+        return None
+    sizes = set(zip(cells.cells(names["width"]), cells.cells(names["height"]), strict=True))
+    if len(sizes) != 1:
+        return None
+    width, height = sizes.pop()
+    return (int(width), int(height)) if width.isdecimal() and height.isdecimal() else None
 
 
 def _times(cells: CsvTable, name: str, context: ReadContext) -> Floats:
