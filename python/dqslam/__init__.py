@@ -11,6 +11,7 @@ if TYPE_CHECKING:  # the one list of public names, a line each: lazy_exports rea
     from dqslam import evaluation as evaluation
     from dqslam import inspection as inspection
     from dqslam import io as io
+    from dqslam import lens as lens
     from dqslam import metrics as metrics
     from dqslam import online as online
     from dqslam import pipeline as pipeline
@@ -55,6 +56,8 @@ if TYPE_CHECKING:  # the one list of public names, a line each: lazy_exports rea
     from dqslam.io import load_recording as load_recording
     from dqslam.io import load_results as load_results
     from dqslam.io import save_estimate as save_estimate
+    from dqslam.lens import Lens as Lens
+    from dqslam.lens import LensCamera as LensCamera
     from dqslam.metrics import Report as Report
     from dqslam.metrics import absolute_trajectory_error as absolute_trajectory_error
     from dqslam.metrics import align_rigid as align_rigid

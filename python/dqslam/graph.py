@@ -9,6 +9,7 @@ from dqslam._checks import Bools, Floats, Ints, as_floats, reject_rows, require
 from dqslam._repr import counted
 from dqslam.assumptions import BoxNoise, SizePrior, SizePriors
 from dqslam.estimate import Estimate
+from dqslam.lens import Lens, LensCamera, camera_with
 from dqslam.recording import Detections, Measurements, Recording
 
 # Where at least this share of all boxes fit, no box is suspected to show something else.
@@ -35,6 +36,8 @@ class Graph:
     """The class of most boxes of each object."""
     observations: Ints
     """Number of boxes of each object, shape (o,)."""
+    lens: Lens | None = None
+    """The lens of the camera, if the core does not know its model."""
 
     def __repr__(self) -> str:
         """Show the pose model, and how many poses, boxes and objects there are."""
@@ -99,7 +102,7 @@ def build_graph(
             pose=detections.pose,
             object=box_object,
             box=detections.box,
-            covariance=_flat(box_noise.covariance(detections.box)),
+            covariance=_flat(box_noise.covariance(detections.box, recording.camera)),
             truncated=detections.truncated,
         ),
         size_prior=_core.SizePriorTable(
@@ -115,6 +118,7 @@ def build_graph(
         object_ids=object_ids,
         class_names=class_names,
         observations=observations,
+        lens=recording.camera.lens if isinstance(recording.camera, LensCamera) else None,
     )
 
 
@@ -168,7 +172,9 @@ def solve(
     kept = ~np.isin(graph.object_ids, list(unfit))
     estimate = Estimate(
         pose_model=graph.core.pose_model,
-        camera=graph.core.camera,
+        camera=graph.core.camera
+        if graph.lens is None
+        else camera_with(graph.core.camera, graph.lens),
         timestamps=graph.timestamps,
         poses=as_floats("solution.poses", solution.poses, initial_poses.shape),
         initial_poses=initial_poses,

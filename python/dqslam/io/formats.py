@@ -14,6 +14,9 @@ Content = TypeVar("Content")
 Progress = Callable[[float], None]
 """A function that is called with the share of a file, 0 to 1, that has been read."""
 
+# Keys that identify a file are looked for in its first bytes.
+HEAD_BYTES = 1 << 16
+
 
 def no_progress(share: float) -> None:
     """Ignore the share."""
@@ -81,6 +84,13 @@ def named_format(name: str, formats: Sequence[Format[Content]], kind: str) -> Fo
             return format_
     known = ", ".join(format_.name for format_ in formats)
     raise ValueError(f"format {name!r} is none of {kind} formats: {known}")
+
+
+def head(look: Look) -> str:
+    """Return the beginning of a text file, enough to see its keys; "" of anything else."""
+    with contextlib.suppress(OSError), look.path.open("rb") as file:
+        return file.read(HEAD_BYTES).decode("utf-8-sig", errors="replace")
+    return ""
 
 
 def look_at(path: str | Path) -> Look:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dqslam import _core
 from dqslam.assumptions import OdometryNoise
 from dqslam.io.camera import read_camera
 from dqslam.io.detections import DetectionTable, read_detections
@@ -18,6 +17,7 @@ from dqslam.io.frames import FrameTimes
 from dqslam.io.sources import FormatNames
 from dqslam.io.step_covariances import read_step_covariances
 from dqslam.io.trajectory import read_trajectory
+from dqslam.lens import undistorted_or_nan
 from dqslam.recording import Detections, Odometry, Recording
 
 # With two boxes and a noisy path, the distance of an object cannot be separated from its size.
@@ -35,11 +35,13 @@ class Dropped:
     without_pose: int  #: boxes with no pose near enough in time
     repeated: int  #: boxes with a better one of the same object at the same pose
     few_boxes: dict[int, int]  #: number of boxes of each object id with fewer than 3
+    beyond_lens: int = 0  #: boxes that reach beyond the range of the lens model
 
     @property
     def total(self) -> int:
         """The number of all dropped boxes."""
         counted = self.below_min_score + self.without_id + self.without_pose + self.repeated
+        counted += self.beyond_lens
         return counted + sum(self.few_boxes.values())
 
 
@@ -56,6 +58,7 @@ def load_recording(
     odometry_covariance: str | Path | None = None,
     formats: FormatNames | None = None,
     frames: FrameTimes | None = None,
+    camera_id: str | None = None,
 ) -> tuple[Recording, Dropped]:
     """Read a recording in SE(3), where the robot is the camera, and the numbers of dropped boxes.
 
@@ -85,6 +88,8 @@ def load_recording(
         Names of the formats, for files that cannot be recognized.
     frames
         Times of the frames, for files that only number them: see ``choose_frame_times``.
+    camera_id
+        Id of the camera, in a file with several.
 
     Raises
     ------
@@ -113,7 +118,7 @@ def load_recording(
     if max_time_difference is not None and not max_time_difference >= 0:
         raise ValueError(f"max_time_difference is {max_time_difference:g}, negative")
     names = formats or FormatNames()
-    lens = read_camera(camera, names.camera)
+    lens = read_camera(camera, names.camera, camera_id=camera_id)
     times, path = read_trajectory(odometry, names.trajectory, frames=frames)
     if len(times) < 2:
         raise FileError(odometry, "one pose only: nothing moves")
@@ -125,10 +130,13 @@ def load_recording(
     tolerance = 0.5 * float(np.median(np.diff(times)))
     if max_time_difference is not None:
         tolerance = max_time_difference
+    box = undistorted_or_nan(lens, table.box) if lens.has_distortion else table.box
     final = final_ids and ids != "none"
     rows, dropped = (_select if final else _select_images)(
-        table, object_id, pose, late, min_score, tolerance
+        table, object_id, pose, late, _scored(table, box, min_score), tolerance
     )
+    beyond = int(np.sum((table.score >= min_score) & ~np.isfinite(box).all(axis=1)))
+    dropped = replace(dropped, beyond_lens=beyond, below_min_score=dropped.below_min_score - beyond)
     if not rows.size:
         raise FileError(detections, _nothing_left(table, dropped, ids, tolerance, times))
     covariance = (odometry_noise or OdometryNoise()).covariance(len(path) - 1)
@@ -141,7 +149,7 @@ def load_recording(
         odometry=Odometry.from_poses(path, covariance=covariance),
         detections=Detections(
             pose=pose[rows],
-            box=_undistorted(lens, camera, table, rows),
+            box=box[rows],
             score=table.score[rows],
             class_id=table.class_id[rows],
             object_id=object_id[rows],
@@ -162,20 +170,9 @@ def nearest_pose(
     return pose, np.abs(pose_times[pose] - times)
 
 
-def _undistorted(
-    lens: _core.Camera, camera: str | Path, table: DetectionTable, rows: NDArray[np.int64]
-) -> NDArray[np.float64]:
-    """Undistort boxes (m, 4); an error names the line of a box where the lens has no inverse."""
-    try:
-        return lens.undistort_boxes(table.box[rows])
-    except ValueError:
-        for row in rows:
-            try:
-                lens.undistort_boxes(table.box[row : row + 1])
-            except ValueError:
-                message = f"the distortion in {camera} has no inverse at this box"
-                raise table.error(int(row), message) from None
-        raise
+def _scored(table: DetectionTable, box: NDArray[np.float64], min_score: float) -> NDArray[np.bool_]:
+    """Tell which boxes have the least score and are not beyond the lens, shape (m,)."""
+    return np.asarray((table.score >= min_score) & np.isfinite(box).all(axis=1))
 
 
 def _object_ids(table: DetectionTable, ids: Ids) -> NDArray[np.int64]:
@@ -196,12 +193,11 @@ def _select(
     object_id: NDArray[np.int64],
     pose: NDArray[np.int64],
     late: NDArray[np.float64],
-    min_score: float,
+    scored: NDArray[np.bool_],
     tolerance: float,
 ) -> tuple[NDArray[np.int64], Dropped]:
     """Choose rows: one box per object and pose, at least 3 per object, by pose and object."""
     score = table.score
-    scored = score >= min_score
     named = scored & (object_id >= 0)
     timely = named & (late <= tolerance)
     rows = np.flatnonzero(timely)
@@ -226,11 +222,10 @@ def _select_images(
     object_id: NDArray[np.int64],
     pose: NDArray[np.int64],
     late: NDArray[np.float64],
-    min_score: float,
+    scored: NDArray[np.bool_],
     tolerance: float,
 ) -> tuple[NDArray[np.int64], Dropped]:
     """Choose rows, by pose: all boxes of the image that is nearest in time to each pose."""
-    scored = table.score >= min_score
     timely = scored & (late <= tolerance)
     rows = np.flatnonzero(timely)
     rows = rows[np.lexsort((rows, late[rows], pose[rows]))]
@@ -253,8 +248,8 @@ def _nothing_left(
     unnamed = "" if ids == "none" else f"{dropped.without_id} without {ids}, "
     return (
         f"no object is left of {len(table.line)} boxes: {dropped.below_min_score} below the least "
-        f"score, {unnamed}{dropped.without_pose} further than "
-        f"{tolerance:g} s from a pose (boxes {table.timestamp.min():.6f} to "
+        f"score, {dropped.beyond_lens} beyond the lens, {unnamed}{dropped.without_pose} further "
+        f"than {tolerance:g} s from a pose (boxes {table.timestamp.min():.6f} to "
         f"{table.timestamp.max():.6f} s, poses {times[0]:.6f} to {times[-1]:.6f} s), "
         f"{dropped.repeated} repeated, {sum(dropped.few_boxes.values())} of objects with fewer "
         f"than {FEWEST_BOXES}"

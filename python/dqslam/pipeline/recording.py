@@ -15,6 +15,7 @@ from dqslam.pipeline.batch import estimate_batch
 from dqslam.pipeline.border import with_cut_edges
 from dqslam.pipeline.conclude import RunResult, conclude
 from dqslam.pipeline.hold_out import choose_held_out
+from dqslam.pipeline.lens import widened
 from dqslam.pipeline.online import estimate_online
 from dqslam.pipeline.options import Progress, RunOptions
 from dqslam.recording import Recording
@@ -71,6 +72,8 @@ def run(
     if reference is not None:  # before the work: may they be compared?
         common_poses(recording.timestamps, reference)
     recording = replace(with_cut_edges(recording), positions=None, measurements=())
+    camera = recording.camera
+    recording, offset = widened(recording)
     boxes = recording.detections
     if isinstance(options.size_prior, SizePriors):
         options.size_prior.check_classes(set(boxes.class_names.values()))
@@ -79,4 +82,10 @@ def run(
     held_out = choose_held_out(len(boxes), options.hold_out, seed=options.seed)
     known = replace(recording, detections=boxes.select(~held_out))
     output = (estimate_online if online else estimate_batch)(known, options, progress)
-    return conclude(output, boxes, held_out, options, reference)
+    result = conclude(output, boxes, held_out, options, reference)
+    shown = result.detections
+    return replace(
+        result,
+        estimate=replace(result.estimate, camera=camera),
+        detections=replace(shown, box=shown.box - np.tile(offset, 2)),
+    )
