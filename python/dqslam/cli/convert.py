@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from dqslam.cli.options import FrameRate, FrameTimesFile, given_frame_times
+from dqslam.cli.options import CameraId, FrameRate, FrameTimesFile, given_frame_times
 from dqslam.cli.output import Json, Output, Quiet
 from dqslam.cli.settings import ConfigFile
 
@@ -25,6 +25,7 @@ def convert(
     camera: Annotated[
         Path | None, typer.Option(help="Camera file with the image size, which YOLO boxes need.")
     ] = None,
+    camera_id: CameraId = None,
     frame_times: FrameTimesFile = None,
     frame_rate: FrameRate = None,
     classes: Annotated[
@@ -57,10 +58,11 @@ def convert(
     output = Output(quiet=quiet, as_json=json)
     size = None
     if camera is not None:
-        lens = io.read_camera(camera)
+        lens = io.read_camera(camera, camera_id=camera_id)
         size = (lens.width, lens.height)
     context = io.ConvertContext(
         size=size,
+        camera_id=camera_id if camera is None else None,
         frames=given_frame_times(frame_times, frame_rate),
         classes=None if classes is None else io.read_class_names(classes),
         body_from_camera=None if camera_in_body is None else io.read_mount(camera_in_body),

@@ -6,6 +6,7 @@ import typer
 
 from dqslam.cli.options import (
     CameraFile,
+    CameraId,
     DetectionFile,
     Formats,
     FrameRate,
@@ -30,6 +31,7 @@ def inspect(
     camera: CameraFile,
     odometry: OdometryFile,
     detections: DetectionFile,
+    camera_id: CameraId = None,
     formats: Formats = None,
     frame_times: FrameTimesFile = None,
     frame_rate: FrameRate = None,
@@ -58,7 +60,7 @@ def inspect(
     with output.steps("inspecting", 3) as done:
         frames = given_frame_times(frame_times, frame_rate)
         frames = frames or io.choose_frame_times(odometry, detections, names)
-        lens = io.read_camera(camera, names.camera)
+        lens = io.read_camera(camera, names.camera, camera_id=camera_id)
         path = io.read_trajectory(odometry, names.trajectory, frames=frames)
         done()
         table = io.read_detections(

@@ -8,7 +8,15 @@ import typer
 if TYPE_CHECKING:
     from dqslam.io import FrameTimes
 
-CameraFile = Annotated[Path, typer.Option(help="Camera file: JSON, TOML, ROS, COLMAP, KITTI, bag.")]
+CameraFile = Annotated[
+    Path, typer.Option(help="Camera file: JSON, TOML, ROS, OpenCV, Kalibr, COLMAP, bag.")
+]
+CameraId = Annotated[
+    str | None,
+    typer.Option(
+        metavar="ID", help="Id of the camera, if the file has several: cam0, Camera1, 2, color."
+    ),
+]
 OdometryFile = Annotated[Path, typer.Option(help="Trajectory file: TUM, KITTI, EuRoC, bag.")]
 DetectionFile = Annotated[
     Path, typer.Option(help="File or folder of boxes: CSV, COCO, YOLO, MOT, bag.")

@@ -9,6 +9,7 @@ import typer
 
 from dqslam.cli.options import (
     CameraFile,
+    CameraId,
     DetectionFile,
     Formats,
     FrameRate,
@@ -37,6 +38,7 @@ def run(
     min_score: Annotated[
         float, typer.Option(help="Leave out boxes with a lower score, 0 to 1.")
     ] = 0.5,
+    camera_id: CameraId = None,
     formats: Formats = None,
     frame_times: FrameTimesFile = None,
     frame_rate: FrameRate = None,
@@ -132,6 +134,7 @@ def run(
         hold_out=hold_out,
         seed=seed,
         min_score=min_score,
+        camera_id=camera_id,
         formats=io.split_formats(formats or []),
         frames=given_frame_times(frame_times, frame_rate),
         max_time_difference=max_time_difference,

@@ -54,6 +54,7 @@ class ConvertContext:
     frames: FrameTimes | None = None
     classes: dict[int, str] | None = None
     body_from_camera: ArrayLike | None = None
+    camera_id: str | None = None  #: id of the camera, if the source has several
 
 
 def convert(
@@ -79,7 +80,7 @@ def convert(
     topics
         Topics of a bag that has several for a kind.
     context
-        Size of the image, times of frames, names of classes, mount of the camera.
+        Size of the image, times of frames, names of classes, mount of the camera, its id.
     progress
         Called with the share of a bag or a folder that has been read; not for other files.
     """
@@ -174,7 +175,7 @@ def _convert(
     progress: Progress,
 ) -> list[Written]:
     if kind == "camera":
-        camera = read_camera(source, format_name, topic=topic)
+        camera = read_camera(source, format_name, topic=topic, camera_id=context.camera_id)
         return _write_camera(out, camera, target)
     origin = choose_format(source, format_name, FORMATS[kind], kind)
     frames = context.frames

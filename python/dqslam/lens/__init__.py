@@ -1,6 +1,7 @@
 """Lens models, and boxes through lenses."""
 
 from dqslam.lens.boxes import distort_boxes as distort_boxes
+from dqslam.lens.boxes import distorted_or_nan as distorted_or_nan
 from dqslam.lens.boxes import edge_scales as edge_scales
 from dqslam.lens.boxes import outline_tilts as outline_tilts
 from dqslam.lens.boxes import undistort_boxes as undistort_boxes

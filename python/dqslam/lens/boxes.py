@@ -8,9 +8,9 @@ correlation of its points,
     u = middle_u + half_width cos(t),
     v = middle_v + half_height (tilt cos(t) + sqrt(1 - tilt^2) sin(t)).
 
-With the tilt, box and recorded box determine each other. It is 0 for an outline whose axes are
-those of the image, which is assumed where nothing is known of the object; an estimate knows it, and
-with it boxes are exact.
+With the tilt, box and recorded box determine each other. Where nothing is known of the object, it
+is that of a small sphere at the middle of the box, which a wide image draws out towards its border;
+an estimate knows it, and with it boxes are exact.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from dqslam.lens.camera import differentiate_pixels, ideal_pixels, recorded_pixe
 # Points of an outline among which the touching points are looked for.
 _POINTS = 48
 # Rounds of Newton's method for a touching point, each with a step for its second derivative.
-_ROUNDS = 4
+_ROUNDS = 5
 _STEP = 1e-4
 # Rounds for a box; from the start used here, four or five reach the accuracy [px].
 _BOX_ROUNDS = 40
@@ -34,10 +34,10 @@ _FARTHEST_TILT = 0.9999
 _SIGNS = np.array([-1.0, -1.0, 1.0, 1.0])
 
 
-def undistort_boxes(camera: _core.Camera, recorded: ArrayLike, tilt: ArrayLike = 0.0) -> Floats:
+def undistort_boxes(camera: _core.Camera, recorded: ArrayLike, tilt: ArrayLike = np.nan) -> Floats:
     """Return the boxes (m, 4) in the pinhole's image of the outlines that boxes (m, 4) bound.
 
-    ``tilt`` is that of each outline, shape (m,), or one for all.
+    ``tilt`` is that of each outline, shape (m,), or one for all; NaN is that of a sphere there.
 
     Raises
     ------
@@ -52,7 +52,7 @@ def undistort_boxes(camera: _core.Camera, recorded: ArrayLike, tilt: ArrayLike =
     return found
 
 
-def distort_boxes(camera: _core.Camera, undistorted: ArrayLike, tilt: ArrayLike = 0.0) -> Floats:
+def distort_boxes(camera: _core.Camera, undistorted: ArrayLike, tilt: ArrayLike = np.nan) -> Floats:
     """Return the boxes (m, 4) as recorded of outlines by their boxes (m, 4) in the pinhole's image.
 
     This inverts ``undistort_boxes``. ``tilt`` is as there.
@@ -65,21 +65,31 @@ def distort_boxes(camera: _core.Camera, undistorted: ArrayLike, tilt: ArrayLike 
     boxes = as_floats("boxes", undistorted, [None, 4])
     if not camera.has_distortion:
         return boxes
-    tilts = _tilts(tilt, len(boxes))
-    recorded, _ = _recorded(camera, boxes, tilts, _touching(camera, boxes, tilts))
+    recorded = distorted_or_nan(camera, boxes, tilt)
     reject_rows("boxes", np.isnan(recorded), "it reaches beyond the range of the lens", boxes)
     return recorded
 
 
-def undistorted_or_nan(camera: _core.Camera, recorded: Floats, tilt: ArrayLike = 0.0) -> Floats:
+def distorted_or_nan(camera: _core.Camera, undistorted: Floats, tilt: ArrayLike = np.nan) -> Floats:
+    """Return what ``distort_boxes`` does, and NaN for outlines beyond the range of the lens."""
+    tilts, _ = _tilts(camera, undistorted, tilt)
+    touching = _touching(camera, undistorted, tilts)
+    recorded, _, _ = _recorded(camera, undistorted, tilts, touching)
+    recorded[np.isnan(recorded).any(axis=1)] = np.nan
+    return recorded
+
+
+def undistorted_or_nan(camera: _core.Camera, recorded: Floats, tilt: ArrayLike = np.nan) -> Floats:
     """Return what ``undistort_boxes`` does, and NaN for boxes beyond the range of the lens."""
-    tilts = _tilts(tilt, len(recorded))
+    given = np.broadcast_to(np.asarray(tilt, dtype=np.float64), (len(recorded),))
     box = _start(camera, recorded)
-    touching = _touching(camera, box, tilts)
     found = np.full_like(box, np.nan)
     rows = np.flatnonzero(np.isfinite(box).all(axis=1))
     for _ in range(_BOX_ROUNDS):
-        now, jacobian = _recorded(camera, box[rows], tilts[rows], touching[rows])
+        tilts, tilt_by_box = _tilts(camera, box[rows], given[rows])
+        touching = _touching(camera, box[rows], tilts)
+        now, jacobian, by_tilt = _recorded(camera, box[rows], tilts, touching)
+        jacobian += by_tilt[:, :, None] * tilt_by_box[:, None, :]
         known = np.isfinite(now).all(axis=1)
         rows, error, jacobian = rows[known], (recorded[rows] - now)[known], jacobian[known]
         done = np.abs(error).max(axis=1, initial=0.0) < _ACCURACY
@@ -92,7 +102,6 @@ def undistorted_or_nan(camera: _core.Camera, recorded: Floats, tilt: ArrayLike =
         side = np.tile(box[rows, 2:] - box[rows, :2], (1, 2))
         longest = np.abs(change / side).max(axis=1)
         box[rows] += change * np.minimum(1.0, 0.25 / np.maximum(longest, 0.25))[:, None]
-        touching[rows] = _refined(camera, box[rows], tilts[rows], touching[rows])
     return found
 
 
@@ -125,10 +134,21 @@ def outline_tilts(
     return np.asarray(np.clip(tilt, -_FARTHEST_TILT, _FARTHEST_TILT))
 
 
-def _tilts(tilt: ArrayLike, count: int) -> Floats:
-    tilts = np.broadcast_to(np.asarray(tilt, dtype=np.float64), (count,))
-    reject_rows("tilt", ~(np.abs(tilts) < 1.0), "not between -1 and 1", tilts)
-    return tilts
+def _tilts(camera: _core.Camera, boxes: Floats, tilt: ArrayLike) -> tuple[Floats, Floats]:
+    """Return the tilts of outlines by their boxes (m, 4), and the derivatives (m, 4) by these.
+
+    Where NaN is given, it is that of a sphere.
+    """
+    tilts = np.broadcast_to(np.asarray(tilt, dtype=np.float64), (len(boxes),))
+    reject_rows("tilt", np.abs(tilts) >= 1.0, "not between -1 and 1", tilts)
+    # A small sphere at (x, y, 1) has the outline of spread [1 + x^2, x y; x y, 1 + y^2].
+    x = (0.5 * (boxes[:, 0] + boxes[:, 2]) - camera.cx) / camera.fx
+    y = (0.5 * (boxes[:, 1] + boxes[:, 3]) - camera.cy) / camera.fy
+    norm = np.sqrt((1 + x**2) * (1 + y**2))
+    along = np.column_stack([y / (1 + x**2) / camera.fx, x / (1 + y**2) / camera.fy])
+    by_box = np.tile(0.5 * along / norm[:, None], (1, 2))
+    free = np.isnan(tilts)
+    return np.where(free, x * y / norm, tilts), np.where(free[:, None], by_box, 0.0)
 
 
 def _start(camera: _core.Camera, recorded: Floats) -> Floats:
@@ -156,27 +176,24 @@ def _touching(camera: _core.Camera, boxes: Floats, tilts: Floats) -> Floats:
     angle = np.linspace(0.0, 2 * np.pi, _POINTS, endpoint=False)
     points, _ = _points(boxes, tilts, np.tile(angle, (len(boxes), 1)))
     recorded = np.tile(recorded_pixels(camera, points), (1, 1, 2)) * _SIGNS
-    first = np.where(np.isnan(recorded), -np.inf, recorded).argmax(axis=1)
-    return _refined(camera, boxes, tilts, angle[first])
-
-
-def _refined(camera: _core.Camera, boxes: Floats, tilts: Floats, angles: Floats) -> Floats:
-    """Move angles (m, 4) to where recorded edges touch the outlines, by Newton's method."""
+    angles = angle[np.where(np.isnan(recorded), -np.inf, recorded).argmax(axis=1)]
+    farthest = angle[1]  # the extreme is next to the best of the points
     for _ in range(_ROUNDS):
         slope, before, after = (
             _slopes(camera, boxes, tilts, angles + step) for step in (0.0, -_STEP, _STEP)
         )
         with np.errstate(invalid="ignore", divide="ignore"):
-            change = -slope * 2 * _STEP / (after - before)
-        # At a minimum of the wrong kind, or at a corner, the step means nothing.
-        angles = angles + np.where(np.abs(change) < 0.3, change, 0.0)
+            newton = -slope * 2 * _STEP / (after - before)
+        uphill = np.sign(slope) * farthest
+        change = np.where(after < before, np.clip(newton, -farthest, farthest), uphill)
+        angles = angles + np.nan_to_num(change)
     return angles
 
 
 def _slopes(camera: _core.Camera, boxes: Floats, tilts: Floats, angles: Floats) -> Floats:
-    """Return the derivatives (m, 4) of recorded edges by the angles of their points."""
+    """Return the derivatives (m, 4) of the outward edges by the angles of their points."""
     _, gradient, along = _edges(camera, boxes, tilts, angles)
-    return np.asarray(np.sum(gradient * along, axis=-1))
+    return np.asarray(_SIGNS * np.sum(gradient * along, axis=-1))
 
 
 def _edges(
@@ -191,8 +208,8 @@ def _edges(
 
 def _recorded(
     camera: _core.Camera, boxes: Floats, tilts: Floats, touching: Floats
-) -> tuple[Floats, Floats]:
-    """Return recorded boxes (m, 4), and their derivatives (m, 4, 4) by those of the pinhole.
+) -> tuple[Floats, Floats, Floats]:
+    """Return recorded boxes (m, 4), and their derivatives by boxes (m, 4, 4) and tilts (m, 4).
 
     An edge is an extreme of the outline, so that only the outline's motion at the touching point
     counts, and not that of the point along it.
@@ -200,4 +217,6 @@ def _recorded(
     unit, _ = _points(np.tile([-1.0, -1.0, 1.0, 1.0], (len(boxes), 1)), tilts, touching)
     recorded, gradient, _ = _edges(camera, boxes, tilts, touching)
     low, high = 0.5 * gradient * (1 - unit), 0.5 * gradient * (1 + unit)
-    return recorded, np.concatenate([low, high], axis=-1)
+    turn = np.cos(touching) - (tilts / np.sqrt(1 - tilts**2))[:, None] * np.sin(touching)
+    by_tilt = gradient[..., 1] * turn * 0.5 * (boxes[:, 3] - boxes[:, 1])[:, None]
+    return recorded, np.concatenate([low, high], axis=-1), by_tilt

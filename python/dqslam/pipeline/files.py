@@ -117,6 +117,7 @@ def _load(files: Sequence[str | Path], options: RunFilesOptions) -> tuple[Record
         odometry_covariance=options.odometry_covariance,
         formats=options.formats,
         frames=options.frames,
+        camera_id=options.camera_id,
     )
     if options.added_noise is not None:
         noisy = perturb_odometry(recording, options.added_noise, seed=options.seed).odometry

@@ -68,9 +68,9 @@ def exact_boxes(
     """
     if not camera.has_distortion or not len(boxes):
         return boxes
-    tilts = np.zeros(len(boxes))
+    tilts = np.full(len(boxes), np.nan)
     real = np.flatnonzero(np.isfinite(ellipsoids).all(axis=1))
-    tilts[real] = np.nan_to_num(outline_tilts(model, camera, poses[real], ellipsoids[real]))
+    tilts[real] = outline_tilts(model, camera, poses[real], ellipsoids[real])
     exact = undistorted_or_nan(camera, distort_boxes(camera, boxes), tilts)
     return np.where(np.isnan(exact), boxes, exact)
 

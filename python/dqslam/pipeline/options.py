@@ -55,6 +55,8 @@ class RunFilesOptions(RunOptions):
     """Least score of a box, 0 to 1; boxes below are left out."""
     formats: FormatNames = FormatNames()
     """Names of the formats of files that do not look like what they are."""
+    camera_id: str | None = None
+    """Id of the camera, in a file with several."""
     frames: FrameTimes | None = None
     """Times of frames, for files that only count them; None takes their numbers for seconds where
     the trajectory counts frames, too."""

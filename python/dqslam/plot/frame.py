@@ -53,13 +53,13 @@ def draw_boxes(
 
 
 def _tilts(results: Results, object_row: Ints, pose: int) -> Floats:
-    """Return the tilts of the outlines that boxes bound, (m,); 0 without an object in front."""
+    """Return the tilts of the outlines that boxes bound, (m,); NaN without an object in front."""
     known = object_row >= 0
-    tilts = np.zeros(len(object_row))
+    tilts = np.full(len(object_row), np.nan)
     objects = results.objects.ellipsoids[object_row[known]]
     here = np.tile(results.poses[pose], (len(objects), 1))
     tilts[known] = outline_tilts(_core.PoseModel.SE3, results.camera, here, objects)
-    return np.nan_to_num(tilts)
+    return tilts
 
 
 def rectangle(box: Floats) -> Floats:
