@@ -112,7 +112,7 @@ def test_boxes_of_small_spheres_need_no_tilts(model):
     ideal, _ = _core.project_to_boxes(PoseModel.SE3, camera, poses, spheres)
     tilts = outline_tilts(PoseModel.SE3, camera, poses, spheres)
     recorded = distort_boxes(camera, ideal, tilts)
-    np.testing.assert_allclose(undistort_boxes(camera, recorded), ideal, rtol=0, atol=0.01)
+    np.testing.assert_allclose(undistort_boxes(camera, recorded), ideal, rtol=0, atol=0.1)
 
 
 def test_edge_scales_are_those_of_small_boxes():

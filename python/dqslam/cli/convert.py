@@ -50,7 +50,8 @@ def convert(
 ) -> None:
     """Convert a camera, a trajectory or detections to another format, or a bag to a folder.
 
-    Formats: json toml ros colmap kitti-calib | tum kitti euroc | csv coco yolo mot | rosbag (read).
+    Formats: json toml ros colmap kitti-calib | tum kitti euroc | csv coco yolo mot. Read, but not
+    written: realsense open3d nerf opencv orbslam kalibr euroc-sensor | rosbag.
     If the format of OUT has no times, they go into a file beside it.
     """
     from dqslam import io

@@ -16,7 +16,7 @@ from dqslam.io.camera.rosbag import KIND as CAMERA_INFO
 from dqslam.io.detections import DETECTION_FORMATS, DetectionTable, read_detections
 from dqslam.io.detections.rosbag import KIND as DETECTION_ARRAY
 from dqslam.io.files import FileError, whole_folder
-from dqslam.io.formats import Format, Progress, choose_format, no_progress
+from dqslam.io.formats import Format, Progress, choose_format, named_format, no_progress
 from dqslam.io.frames import BY_NUMBER, FrameTimes, write_frame_times
 from dqslam.io.rosbag import NAME as BAG
 from dqslam.io.rosbag import bag_topics
@@ -144,7 +144,10 @@ def _kind(source: Path, format_name: str | None, to: str | None) -> str | None:
 
 def _target(out: Path, to: str | None, kind: str) -> Format[Any]:
     if to is not None:
-        return choose_format(out, to, FORMATS[kind], kind)
+        target = named_format(to, FORMATS[kind], kind)
+        if target.write is None:
+            raise ValueError(f"--to: {to} is read, not written")
+        return target
     for format_ in FORMATS[kind]:
         if out.suffix.lower() in format_.endings:
             return format_

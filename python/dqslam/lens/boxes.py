@@ -9,8 +9,8 @@ correlation of its points,
     v = middle_v + half_height (tilt cos(t) + sqrt(1 - tilt^2) sin(t)).
 
 With the tilt, box and recorded box determine each other. Where nothing is known of the object, it
-is that of a small sphere at the middle of the box, which a wide image draws out towards its border;
-an estimate knows it, and with it boxes are exact.
+is that of an outline whose axes are those of the image as recorded; an estimate knows it, and with
+it boxes are exact.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from dqslam._checks import Floats, as_floats, reject_rows
 from dqslam.lens.camera import differentiate_pixels, ideal_pixels, recorded_pixels
 
 # Points of an outline among which the touching points are looked for.
-_POINTS = 48
+_POINTS = 24
 # Rounds of Newton's method for a touching point, each with a step for its second derivative.
-_ROUNDS = 5
-_STEP = 1e-4
+_ROUNDS = 3
+_STEP = 1e-5
 # Rounds for a box; from the start used here, four or five reach the accuracy [px].
 _BOX_ROUNDS = 40
 _ACCURACY = 1e-8
@@ -37,7 +37,8 @@ _SIGNS = np.array([-1.0, -1.0, 1.0, 1.0])
 def undistort_boxes(camera: _core.Camera, recorded: ArrayLike, tilt: ArrayLike = np.nan) -> Floats:
     """Return the boxes (m, 4) in the pinhole's image of the outlines that boxes (m, 4) bound.
 
-    ``tilt`` is that of each outline, shape (m,), or one for all; NaN is that of a sphere there.
+    ``tilt`` is that of each outline, shape (m,), or one for all; NaN takes the
+    axes of the outline as recorded for those of the image.
 
     Raises
     ------
@@ -72,24 +73,37 @@ def distort_boxes(camera: _core.Camera, undistorted: ArrayLike, tilt: ArrayLike 
 
 def distorted_or_nan(camera: _core.Camera, undistorted: Floats, tilt: ArrayLike = np.nan) -> Floats:
     """Return what ``distort_boxes`` does, and NaN for outlines beyond the range of the lens."""
-    tilts, _ = _tilts(camera, undistorted, tilt)
-    touching = _touching(camera, undistorted, tilts)
-    recorded, _, _ = _recorded(camera, undistorted, tilts, touching)
+    tilts = _given_tilts(tilt, len(undistorted)).copy()
+    rows = np.flatnonzero(np.isnan(tilts))
+    tilts[rows] = 0.0
+    recorded, _, _ = _recorded(camera, undistorted, tilts)
+    slope = _straight_slopes(camera, recorded[rows])
+    for _ in range(_BOX_ROUNDS):
+        if not rows.size:
+            break
+        # The tilt depends on the recorded box, and this on the tilt: Newton's method.
+        tilts[rows] = _straight_tilts(camera, recorded[rows])
+        after, _, by_tilt = _recorded(camera, undistorted[rows], tilts[rows])
+        change = after - recorded[rows]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            along = np.sum(slope * change, axis=1) / (1 - np.sum(slope * by_tilt, axis=1))
+        recorded[rows] += change + along[:, None] * by_tilt
+        left = np.abs(change).max(axis=1, initial=0.0) > _ACCURACY  # false for NaN
+        rows, slope = rows[left], slope[left]
     recorded[np.isnan(recorded).any(axis=1)] = np.nan
+    recorded[rows] = np.nan
     return recorded
 
 
 def undistorted_or_nan(camera: _core.Camera, recorded: Floats, tilt: ArrayLike = np.nan) -> Floats:
     """Return what ``undistort_boxes`` does, and NaN for boxes beyond the range of the lens."""
-    given = np.broadcast_to(np.asarray(tilt, dtype=np.float64), (len(recorded),))
+    given = _given_tilts(tilt, len(recorded))
+    tilts = np.where(np.isnan(given), _straight_tilts(camera, recorded), given)
     box = _start(camera, recorded)
     found = np.full_like(box, np.nan)
-    rows = np.flatnonzero(np.isfinite(box).all(axis=1))
+    rows = np.flatnonzero(np.isfinite(box).all(axis=1) & np.isfinite(tilts))
     for _ in range(_BOX_ROUNDS):
-        tilts, tilt_by_box = _tilts(camera, box[rows], given[rows])
-        touching = _touching(camera, box[rows], tilts)
-        now, jacobian, by_tilt = _recorded(camera, box[rows], tilts, touching)
-        jacobian += by_tilt[:, :, None] * tilt_by_box[:, None, :]
+        now, jacobian, _ = _recorded(camera, box[rows], tilts[rows])
         known = np.isfinite(now).all(axis=1)
         rows, error, jacobian = rows[known], (recorded[rows] - now)[known], jacobian[known]
         done = np.abs(error).max(axis=1, initial=0.0) < _ACCURACY
@@ -134,21 +148,36 @@ def outline_tilts(
     return np.asarray(np.clip(tilt, -_FARTHEST_TILT, _FARTHEST_TILT))
 
 
-def _tilts(camera: _core.Camera, boxes: Floats, tilt: ArrayLike) -> tuple[Floats, Floats]:
-    """Return the tilts of outlines by their boxes (m, 4), and the derivatives (m, 4) by these.
-
-    Where NaN is given, it is that of a sphere.
-    """
-    tilts = np.broadcast_to(np.asarray(tilt, dtype=np.float64), (len(boxes),))
+def _given_tilts(tilt: ArrayLike, count: int) -> Floats:
+    tilts = np.broadcast_to(np.asarray(tilt, dtype=np.float64), (count,))
     reject_rows("tilt", np.abs(tilts) >= 1.0, "not between -1 and 1", tilts)
-    # A small sphere at (x, y, 1) has the outline of spread [1 + x^2, x y; x y, 1 + y^2].
-    x = (0.5 * (boxes[:, 0] + boxes[:, 2]) - camera.cx) / camera.fx
-    y = (0.5 * (boxes[:, 1] + boxes[:, 3]) - camera.cy) / camera.fy
-    norm = np.sqrt((1 + x**2) * (1 + y**2))
-    along = np.column_stack([y / (1 + x**2) / camera.fx, x / (1 + y**2) / camera.fy])
-    by_box = np.tile(0.5 * along / norm[:, None], (1, 2))
-    free = np.isnan(tilts)
-    return np.where(free, x * y / norm, tilts), np.where(free[:, None], by_box, 0.0)
+    return tilts
+
+
+def _straight_tilts(camera: _core.Camera, recorded: Floats) -> Floats:
+    """Return the tilts (m,) of outlines whose axes are those of the image as recorded.
+
+    The lens is taken for linear around the middle of the recorded box.
+    """
+    half = 0.5 * (recorded[:, 2:] - recorded[:, :2])
+    middle = ideal_pixels(camera, 0.5 * (recorded[:, :2] + recorded[:, 2:]))
+    _, jacobian = differentiate_pixels(camera, middle)
+    (a, b), (c, d) = jacobian.transpose(1, 2, 0)
+    # The rows of the inverse of [a b; c d], up to its determinant, times the half sides.
+    x, y = np.column_stack([d, -b]) * half, np.column_stack([-c, a]) * half
+    norm = np.linalg.norm(x, axis=1) * np.linalg.norm(y, axis=1)
+    tilt = np.sum(x * y, axis=1) / norm
+    return np.asarray(np.clip(tilt, -_FARTHEST_TILT, _FARTHEST_TILT))
+
+
+def _straight_slopes(camera: _core.Camera, recorded: Floats) -> Floats:
+    """Return the derivatives (m, 4) of these tilts by the recorded boxes."""
+    steps = 1e-4 * np.eye(4)
+    change = [
+        _straight_tilts(camera, recorded + step) - _straight_tilts(camera, recorded - step)
+        for step in steps
+    ]
+    return np.stack(change, axis=1) / 2e-4
 
 
 def _start(camera: _core.Camera, recorded: Floats) -> Floats:
@@ -176,16 +205,15 @@ def _touching(camera: _core.Camera, boxes: Floats, tilts: Floats) -> Floats:
     angle = np.linspace(0.0, 2 * np.pi, _POINTS, endpoint=False)
     points, _ = _points(boxes, tilts, np.tile(angle, (len(boxes), 1)))
     recorded = np.tile(recorded_pixels(camera, points), (1, 1, 2)) * _SIGNS
-    angles = angle[np.where(np.isnan(recorded), -np.inf, recorded).argmax(axis=1)]
+    best = np.where(np.isnan(recorded), -np.inf, recorded).argmax(axis=1)
+    angles: Floats = angle[best]
     farthest = angle[1]  # the extreme is next to the best of the points
     for _ in range(_ROUNDS):
-        slope, before, after = (
-            _slopes(camera, boxes, tilts, angles + step) for step in (0.0, -_STEP, _STEP)
-        )
+        slope, after = (_slopes(camera, boxes, tilts, angles + step) for step in (0.0, _STEP))
         with np.errstate(invalid="ignore", divide="ignore"):
-            newton = -slope * 2 * _STEP / (after - before)
+            newton = -slope * _STEP / (after - slope)
         uphill = np.sign(slope) * farthest
-        change = np.where(after < before, np.clip(newton, -farthest, farthest), uphill)
+        change = np.where(after < slope, np.clip(newton, -farthest, farthest), uphill)
         angles = angles + np.nan_to_num(change)
     return angles
 
@@ -206,14 +234,13 @@ def _edges(
     return recorded[:, edge, edge % 2], jacobian[:, edge, edge % 2], along
 
 
-def _recorded(
-    camera: _core.Camera, boxes: Floats, tilts: Floats, touching: Floats
-) -> tuple[Floats, Floats, Floats]:
+def _recorded(camera: _core.Camera, boxes: Floats, tilts: Floats) -> tuple[Floats, Floats, Floats]:
     """Return recorded boxes (m, 4), and their derivatives by boxes (m, 4, 4) and tilts (m, 4).
 
     An edge is an extreme of the outline, so that only the outline's motion at the touching point
     counts, and not that of the point along it.
     """
+    touching = _touching(camera, boxes, tilts)
     unit, _ = _points(np.tile([-1.0, -1.0, 1.0, 1.0], (len(boxes), 1)), tilts, touching)
     recorded, gradient, _ = _edges(camera, boxes, tilts, touching)
     low, high = 0.5 * gradient * (1 - unit), 0.5 * gradient * (1 + unit)

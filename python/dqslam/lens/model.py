@@ -35,12 +35,12 @@ PARAMETERS: dict[str, tuple[str, ...]] = {
 FISHEYES = ("equidistant", "thin_prism_fisheye")
 # Steps of Newton's method: from the radial inverse, four or five reach the last digit.
 _NEWTON_STEPS = 20
-_BISECTIONS = 60
 # Of the recorded coordinates, which are of order 1.
 _TOLERANCE = 1e-13
 # Points this near to the end of the range, as a share of it, are beyond it.
 _EDGE = 1e-9
-# Where the radius nowhere turns back, bisection needs an end all the same: 89.4 degrees.
+# The radial part is tabulated at so many radii; where it nowhere turns back, up to 89.4 degrees.
+_TABLE = 4096
 _FARTHEST = 100.0
 
 
@@ -93,7 +93,7 @@ class Lens:
         bent, by_inner = self._bend(inner)
         outside = ~self._in_range(inner, by_inner)
         bent[outside] = np.nan
-        jacobian = by_inner @ by_ideal
+        jacobian = by_inner if by_ideal is None else _product(by_inner, by_ideal)
         jacobian[outside] = np.nan
         return bent, jacobian
 
@@ -149,11 +149,13 @@ class Lens:
             ends.append(np.pi / (2 * self.parameters[0]))
         return float(min(ends, default=np.inf))
 
-    def _inner(self, ideal: Floats) -> tuple[Floats, Floats]:
-        """Return q (..., 2), and its derivatives by the ideal coordinates (..., 2, 2)."""
-        identity = np.broadcast_to(np.eye(2), (*ideal.shape, 2))
+    def _inner(self, ideal: Floats) -> tuple[Floats, Floats | None]:
+        """Return q (..., 2), and its derivatives by the ideal coordinates (..., 2, 2).
+
+        The derivatives are None where both are the same.
+        """
         if self.model not in (*FISHEYES, "fov"):
-            return ideal, identity
+            return ideal, None
         r = np.linalg.norm(ideal, axis=-1)
         if self.model == "fov":
             (omega,) = self.parameters
@@ -170,7 +172,7 @@ class Lens:
         ratio = np.where(near, at_zero, g / safe)
         unit = ideal / safe[..., None]
         radial = np.where(near, 0.0, by_r - ratio)
-        jacobian = ratio[..., None, None] * identity
+        jacobian = ratio[..., None, None] * np.eye(2)
         jacobian = jacobian + radial[..., None, None] * unit[..., :, None] * unit[..., None, :]
         return ratio[..., None] * ideal, jacobian
 
@@ -191,11 +193,8 @@ class Lens:
     def _bend(self, inner: Floats) -> tuple[Floats, Floats]:
         """Return d (..., 2), and its derivatives by q (..., 2, 2)."""
         x, y = inner[..., 0], inner[..., 1]
-        s = x**2 + y**2
-        above, below = self._radial
-        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-            ratio = above(s) / below(s)
-            by_s = (above.deriv()(s) - ratio * below.deriv()(s)) / below(s)
+        s = x * x + y * y
+        ratio, by_s = self._ratio(s)
         p1, p2 = self._coefficients(("p1", "p2"))
         if self.model == "thin_prism_fisheye":
             s1, s3 = self._coefficients(("sx1", "sy1"))
@@ -206,40 +205,66 @@ class Lens:
         v = y * ratio + p1 * (s + 2 * y * y) + 2 * p2 * x * y + s * (s3 + s4 * s)
         along_u, along_v = 2 * (x * by_s + s1 + 2 * s2 * s), 2 * (y * by_s + s3 + 2 * s4 * s)
         cross = 2 * p1 * x + 2 * p2 * y
-        jacobian = np.stack(
-            [
-                np.stack([ratio + along_u * x + 2 * p1 * y + 6 * p2 * x, along_u * y + cross], -1),
-                np.stack([along_v * x + cross, ratio + along_v * y + 6 * p1 * y + 2 * p2 * x], -1),
-            ],
-            axis=-2,
-        )
+        jacobian = np.empty((*inner.shape, 2))
+        jacobian[..., 0, 0] = ratio + along_u * x + 2 * p1 * y + 6 * p2 * x
+        jacobian[..., 0, 1] = along_u * y + cross
+        jacobian[..., 1, 0] = along_v * x + cross
+        jacobian[..., 1, 1] = ratio + along_v * y + 6 * p1 * y + 2 * p2 * x
         return np.stack([u, v], axis=-1), jacobian
+
+    def _ratio(self, s: Floats) -> tuple[Floats, Floats]:
+        """Return N(s) / D(s), and its derivative."""
+        above, below = (part.coef.astype(np.float64) for part in self._radial)
+        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+            value, slope = _horner(above, s)
+            if not below[1:].any():
+                return value, slope
+            divisor, its_slope = _horner(below, s)
+            ratio = value / divisor
+            return ratio, (slope - ratio * its_slope) / divisor
 
     def _in_range(self, inner: Floats, jacobian: Floats) -> np.ndarray:
         """Tell where q (..., 2) is in front of the fold, by the derivatives of d by it."""
         with np.errstate(invalid="ignore", over="ignore"):
-            radius = np.linalg.norm(inner, axis=-1)
+            radius = np.hypot(inner[..., 0], inner[..., 1])
             unfolded = _determinant(jacobian) > 0
             return np.asarray((radius < self._limit * (1 - _EDGE)) & unfolded)
 
+    @cached_property
+    def _radii(self) -> tuple[Floats, Floats]:
+        """Radii of q up to the end of the range, and those of d, which grow with them."""
+        end = min(self._limit * (1 - _EDGE), _FARTHEST)
+        inner = np.tan(np.linspace(0.0, np.arctan(end), _TABLE))
+        return inner, inner * self._ratio(inner**2)[0]
+
     def _radial_start(self, recorded: Floats) -> Floats:
-        """Invert the radial part alone, by bisection: q (..., 2)."""
-        radius = np.linalg.norm(recorded, axis=-1)
-        above, below = self._radial
-        low = np.zeros_like(radius)
-        high = np.full_like(radius, min(self._limit * (1 - _EDGE), _FARTHEST))
-        for _ in range(_BISECTIONS):
-            middle = 0.5 * (low + high)
-            with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-                less = middle * above(middle**2) / below(middle**2) < radius
-            low, high = np.where(less, middle, low), np.where(less, high, middle)
-        safe = np.where(radius > 0, radius, 1.0)
-        return np.asarray(recorded * np.where(radius > 0, low / safe, 1.0)[..., None])
+        """Invert the radial part alone, by a table: q (..., 2)."""
+        radius = np.hypot(recorded[..., 0], recorded[..., 1])
+        inner, bent = self._radii
+        with np.errstate(invalid="ignore", divide="ignore"):
+            scale = np.interp(radius, bent, inner) / radius
+        return np.asarray(recorded * np.where(radius > 0, scale, 1.0)[..., None])
+
+
+def _horner(coefficients: Floats, s: Floats) -> tuple[Floats, Floats]:
+    """Return a polynomial and its derivative; the constant comes first."""
+    value, slope = np.full_like(s, coefficients[-1]), np.zeros_like(s)
+    for coefficient in coefficients[-2::-1].tolist():
+        slope = slope * s + value
+        value = value * s + coefficient
+    return value, slope
 
 
 def _determinant(jacobian: Floats) -> Floats:
     return np.asarray(
         jacobian[..., 0, 0] * jacobian[..., 1, 1] - jacobian[..., 0, 1] * jacobian[..., 1, 0]
+    )
+
+
+def _product(a: Floats, b: Floats) -> Floats:
+    """Return products of 2 x 2 matrices; np.matmul is slow for such small ones."""
+    return np.asarray(
+        a[..., :, :1] * b[..., :1, :] + a[..., :, 1:] * b[..., 1:, :],
     )
 
 
