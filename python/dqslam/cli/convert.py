@@ -12,7 +12,7 @@ from dqslam.cli.settings import ConfigFile
 
 def convert(
     source: Annotated[
-        Path, typer.Argument(metavar="IN", help="File, YOLO folder, or bag to read.")
+        Path, typer.Argument(metavar="IN", help="File, YOLO folder, bag, or directory of results.")
     ],
     out: Annotated[Path, typer.Argument(metavar="OUT", help="File or folder to write.")],
     format_: Annotated[
@@ -40,6 +40,10 @@ def convert(
             help="File with body_from_camera, 7, 12 or 16 numbers, if the poses are a body's."
         ),
     ] = None,
+    odometry_covariance: Annotated[
+        Path | None,
+        typer.Option(help="CSV of the covariance of each step, for pose graphs of results."),
+    ] = None,
     topic: Annotated[
         list[str] | None,
         typer.Option(metavar="NAME", help="Topic, if a bag has several of a kind; repeatable."),
@@ -49,6 +53,8 @@ def convert(
     json: Json = False,
 ) -> None:
     """Convert a camera, a trajectory or detections to another format, or a bag to a folder.
+
+    Directories of results are written as pose graphs, --to g2o or gtsam, or --to colmap-model.
 
     Formats: json toml ros colmap kitti-calib | tum kitti euroc | csv coco yolo mot. Read, but not
     written: realsense open3d nerf opencv orbslam kalibr euroc-sensor | rosbag.
@@ -63,6 +69,7 @@ def convert(
         size = (lens.width, lens.height)
     context = io.ConvertContext(
         size=size,
+        odometry_covariance=odometry_covariance,
         camera_id=camera_id if camera is None else None,
         frames=given_frame_times(frame_times, frame_rate),
         classes=None if classes is None else io.read_class_names(classes),

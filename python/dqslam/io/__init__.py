@@ -2,6 +2,7 @@
 
 from dqslam.io.camera import CAMERA_FORMATS as CAMERA_FORMATS
 from dqslam.io.camera import read_camera as read_camera
+from dqslam.io.colmap_model import write_colmap_model as write_colmap_model
 from dqslam.io.convert import ConvertContext as ConvertContext
 from dqslam.io.convert import Written as Written
 from dqslam.io.convert import convert as convert
@@ -17,6 +18,11 @@ from dqslam.io.frames import read_frame_times as read_frame_times
 from dqslam.io.images import find_images as find_images
 from dqslam.io.mount import read_mount as read_mount
 from dqslam.io.ply import write_ply as write_ply
+from dqslam.io.pose_graph import LandmarkEdges as LandmarkEdges
+from dqslam.io.pose_graph import PoseGraph as PoseGraph
+from dqslam.io.pose_graph import pose_graph_of_results as pose_graph_of_results
+from dqslam.io.pose_graph import positions_of_boxes as positions_of_boxes
+from dqslam.io.pose_graph import write_g2o as write_g2o
 from dqslam.io.recording import Dropped as Dropped
 from dqslam.io.recording import load_recording as load_recording
 from dqslam.io.recording import nearest_pose as nearest_pose
