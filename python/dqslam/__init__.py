@@ -37,6 +37,7 @@ if TYPE_CHECKING:  # the one list of public names, a line each: lazy_exports rea
     from dqslam._core import StepReport as StepReport
     from dqslam._core import Summary as Summary
     from dqslam._core import VariableKind as VariableKind
+    from dqslam.absolute import solve_with_absolute_positions as solve_with_absolute_positions
     from dqslam.association import Association as Association
     from dqslam.association import associate as associate
     from dqslam.assumptions import BoxNoise as BoxNoise
@@ -78,7 +79,9 @@ if TYPE_CHECKING:  # the one list of public names, a line each: lazy_exports rea
     from dqslam.pipeline import run as run
     from dqslam.pipeline import run_files as run_files
     from dqslam.plot import plot_maps as plot_maps
+    from dqslam.recording import AbsolutePositions as AbsolutePositions
     from dqslam.recording import Detections as Detections
+    from dqslam.recording import LoopClosures as LoopClosures
     from dqslam.recording import Measurements as Measurements
     from dqslam.recording import Odometry as Odometry
     from dqslam.recording import Recording as Recording

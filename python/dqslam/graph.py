@@ -10,7 +10,7 @@ from dqslam._repr import counted
 from dqslam.assumptions import BoxNoise, SizePrior, SizePriors
 from dqslam.estimate import Estimate
 from dqslam.lens import Lens, LensCamera, camera_with
-from dqslam.recording import Detections, Measurements, Recording
+from dqslam.recording import Detections, LoopClosures, Measurements, Odometry, Recording
 
 # Where at least this share of all boxes fit, no box is suspected to show something else.
 TRUSTED_SHARE = 0.99
@@ -68,7 +68,8 @@ def build_graph(
     Raises
     ------
     ValueError
-        If there are no boxes, if a box has no object id, if a relative position is of an object
+        If there are no boxes, if a box has no object id, if there are absolute positions, which
+        ``with_absolute_positions`` adds to a graph, if a relative position is of an object
         without boxes or a size prior of a class without boxes, or if the core refuses the problem.
 
     Examples
@@ -80,24 +81,20 @@ def build_graph(
     Graph(SE2, 253 poses, 456 boxes of 10 objects)
     """
     require(recording, Recording, "build_graph", "recording, truth = simulate(scenario, seed=0)")
+    if recording.absolute is not None:
+        raise ValueError("absolute: with_absolute_positions(graph, absolute) adds them to a graph")
     box_noise = BoxNoise() if box_noise is None else box_noise
     odometry, detections = recording.odometry, recording.detections
     object_ids, box_object, observations = _objects(detections)
     class_names = _class_names(detections, box_object, len(object_ids))
     priors = _size_priors(size_prior, class_names, detections)
-    steps = np.arange(len(odometry.relative))
     core = _core.Graph(
         odometry.pose_model,
         recording.camera,
         initial_poses=_core.dead_reckon(
             odometry.pose_model, odometry.first_pose, odometry.relative
         ),
-        odometry=_core.OdometryTable(
-            from_pose=steps,
-            to_pose=steps + 1,
-            relative=odometry.relative,
-            covariance=_flat(odometry.covariance),
-        ),
+        odometry=_odometry_table(odometry, recording.closures),
         boxes=_core.BoxTable(
             pose=detections.pose,
             object=box_object,
@@ -224,6 +221,32 @@ def _size_priors(
         given.check_classes(set(detections.class_names.values()))
         return [given.of(name) for name in class_names]
     return [SizePrior() if given is None else given] * len(class_names)
+
+
+def _odometry_table(odometry: Odometry, closures: LoopClosures | None) -> _core.OdometryTable:
+    """Lay out the steps, then the closures, which the core has as odometry back in time."""
+    model, steps = odometry.pose_model, np.arange(len(odometry.relative))
+    tables = [(steps, steps + 1, odometry.relative, odometry.covariance)]
+    if closures is not None:
+        first, second = closures.from_pose, closures.to_pose
+        ahead = first < second
+        # The inverse of to_in_from has its error in the frame of the first pose.
+        adjoint = _core.adjoint(model, closures.relative)
+        moved = adjoint @ closures.covariance @ adjoint.transpose(0, 2, 1)
+        tables.append(
+            (
+                np.where(ahead, second, first),
+                np.where(ahead, first, second),
+                np.where(
+                    ahead[:, None], _core.inverse(model, closures.relative), closures.relative
+                ),
+                np.where(ahead[:, None, None], moved, closures.covariance),
+            )
+        )
+    from_pose, to_pose, relative, covariance = map(np.concatenate, zip(*tables, strict=True))
+    return _core.OdometryTable(
+        from_pose=from_pose, to_pose=to_pose, relative=relative, covariance=_flat(covariance)
+    )
 
 
 def _objects(detections: Detections) -> tuple[Ints, Ints, Ints]:
