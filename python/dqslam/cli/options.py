@@ -38,6 +38,17 @@ FrameRate = Annotated[
         help="Frames per second, with frame 0 at 0 s. Default: --frame-times or the files.",
     ),
 ]
+PositionsFile = Annotated[
+    Path | None,
+    typer.Option(help="CSV of measured centers of objects in the camera frame, with final ids."),
+]
+AbsoluteFile = Annotated[
+    Path | None,
+    typer.Option(help="CSV of positions of the camera in a frame of their own, like GPS."),
+]
+ClosuresFile = Annotated[
+    Path | None, typer.Option(help="CSV of relative poses of the camera: loop closures.")
+]
 MaxTimeDifference = Annotated[
     float | None,
     typer.Option(help="Most seconds from a box to its pose. Default: half the interval of poses."),

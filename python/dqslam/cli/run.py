@@ -8,14 +8,17 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from dqslam.cli.options import (
+    AbsoluteFile,
     CameraFile,
     CameraId,
+    ClosuresFile,
     DetectionFile,
     Formats,
     FrameRate,
     FrameTimesFile,
     MaxTimeDifference,
     OdometryFile,
+    PositionsFile,
     ResultDirectory,
     given_frame_times,
 )
@@ -85,6 +88,9 @@ def run(
             help="CSV of the covariance of each step, m and rad squared, instead of one sigma."
         ),
     ] = None,
+    positions: PositionsFile = None,
+    absolute: AbsoluteFile = None,
+    closures: ClosuresFile = None,
     groundtruth: Annotated[
         Path | None, typer.Option(help="TUM trajectory to compare with, in any world frame.")
     ] = None,
@@ -134,6 +140,7 @@ def run(
         hold_out=hold_out,
         seed=seed,
         min_score=min_score,
+        extras=io.Extras(positions=positions, absolute=absolute, closures=closures),
         camera_id=camera_id,
         formats=io.split_formats(formats or []),
         frames=given_frame_times(frame_times, frame_rate),

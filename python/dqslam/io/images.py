@@ -9,7 +9,7 @@ import numpy as np
 from dqslam._checks import Floats
 from dqslam.io.files import FileError
 from dqslam.io.frames import FrameTimes, frame_of, image_name
-from dqslam.io.recording import nearest_pose
+from dqslam.io.nearest import nearest_pose
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".ppm", ".pgm", ".tif", ".tiff", ".webp")
 _NANOSECONDS = 1e15  # seconds would be after the year 30 000 000

@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 from dqslam.assumptions import OdometryNoise
 from dqslam.io.camera import read_camera
 from dqslam.io.detections import DetectionTable, read_detections
+from dqslam.io.extras import Extras
 from dqslam.io.files import FileError
 from dqslam.io.frames import FrameTimes
+from dqslam.io.nearest import nearest_pose
 from dqslam.io.sources import FormatNames
 from dqslam.io.step_covariances import read_step_covariances
 from dqslam.io.trajectory import read_trajectory
@@ -59,6 +61,7 @@ def load_recording(
     formats: FormatNames | None = None,
     frames: FrameTimes | None = None,
     camera_id: str | None = None,
+    extras: Extras | None = None,
 ) -> tuple[Recording, Dropped]:
     """Read a recording in SE(3), where the robot is the camera, and the numbers of dropped boxes.
 
@@ -90,6 +93,8 @@ def load_recording(
         Times of the frames, for files that only number them: see ``choose_frame_times``.
     camera_id
         Id of the camera, in a file with several.
+    extras
+        Files of other measurements: see ``io.measurements``.
 
     Raises
     ------
@@ -155,19 +160,8 @@ def load_recording(
             object_id=object_id[rows],
             class_names={number: name or str(number) for number, name in classes.items()},
         ),
-        positions=None,
     )
-    return recording, dropped
-
-
-def nearest_pose(
-    pose_times: NDArray[np.float64], times: NDArray[np.float64]
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Find the pose nearest in time to each of ``times`` (m,): its row, and the difference in s."""
-    after = np.clip(np.searchsorted(pose_times, times), 1, len(pose_times) - 1)
-    nearer_before = times - pose_times[after - 1] <= pose_times[after] - times
-    pose = (after - nearer_before).astype(np.int64)
-    return pose, np.abs(pose_times[pose] - times)
+    return (extras or Extras()).added_to(recording, max_time_difference), dropped
 
 
 def _scored(table: DetectionTable, box: NDArray[np.float64], min_score: float) -> NDArray[np.bool_]:

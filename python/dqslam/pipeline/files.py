@@ -118,6 +118,7 @@ def _load(files: Sequence[str | Path], options: RunFilesOptions) -> tuple[Record
         formats=options.formats,
         frames=options.frames,
         camera_id=options.camera_id,
+        extras=options.extras,
     )
     if options.added_noise is not None:
         noisy = perturb_odometry(recording, options.added_noise, seed=options.seed).odometry
@@ -137,6 +138,10 @@ def _describe(options: RunFilesOptions) -> dict[str, Any]:
         "odometry_noise_added": None if added is None else asdict(added) | {"seed": options.seed},
         "odometry_noise_believed": None if believed is None else asdict(believed),
         "odometry_covariance": None if covariance is None else str(covariance),
+        "measurements": {
+            name: None if file is None else str(file)
+            for name, file in asdict(options.extras).items()
+        },
     }
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from dqslam import _core
 from dqslam.association import FINAL
 from dqslam.assumptions import BoxNoise, OdometryNoise, SizePrior, SizePriors
-from dqslam.io import FormatNames, FrameTimes
+from dqslam.io import Extras, FormatNames, FrameTimes
 from dqslam.io.recording import Ids
 
 Progress = Callable[[float, str], None]
@@ -55,6 +55,8 @@ class RunFilesOptions(RunOptions):
     """Least score of a box, 0 to 1; boxes below are left out."""
     formats: FormatNames = FormatNames()
     """Names of the formats of files that do not look like what they are."""
+    extras: Extras = Extras()
+    """Files of positions of objects, of absolute positions and of loop closures."""
     camera_id: str | None = None
     """Id of the camera, in a file with several."""
     frames: FrameTimes | None = None

@@ -16,6 +16,7 @@ from dqslam.pipeline.border import with_cut_edges
 from dqslam.pipeline.conclude import RunResult, conclude
 from dqslam.pipeline.hold_out import choose_held_out
 from dqslam.pipeline.lens import widened
+from dqslam.pipeline.measurements import check_measurements, with_measurements
 from dqslam.pipeline.online import estimate_online
 from dqslam.pipeline.options import Progress, RunOptions
 from dqslam.recording import Recording
@@ -33,7 +34,9 @@ def run(
 
     Edges of boxes on the border of the image bound the object from one side only. Objects that do
     not fit a world at rest are left out; without any object, the odometry is returned as it is.
-    Relative positions and other measurements take no part.
+    Positions of objects, absolute positions and loop closures take part in a last estimate of all
+    poses and objects, whose boxes are known by then. With absolute positions, the result is in
+    their frame. Measurements of other kinds take no part.
 
     Parameters
     ----------
@@ -53,8 +56,9 @@ def run(
     Raises
     ------
     ValueError
-        For ``online`` in mode MAPPING, an option out of range, final ids that a box lacks, size
-        priors of a class that is not in the recording, or a reference of another time.
+        For ``online`` or measurements in mode MAPPING, positions without final ids, an option out
+        of range, final ids that a box lacks, size priors of a class that is not in the recording,
+        or a reference of another time.
 
     Examples
     --------
@@ -71,7 +75,8 @@ def run(
         raise ValueError("online: a session improves the odometry, it has no mode MAPPING")
     if reference is not None:  # before the work: may they be compared?
         common_poses(recording.timestamps, reference)
-    recording = replace(with_cut_edges(recording), positions=None, measurements=())
+    recording = with_cut_edges(recording)
+    check_measurements(recording, options)
     camera = recording.camera
     recording, offset = widened(recording)
     boxes = recording.detections
@@ -81,7 +86,9 @@ def run(
         options = replace(options, trust_ids=min(options.trust_ids, UNSURE))
     held_out = choose_held_out(len(boxes), options.hold_out, seed=options.seed)
     known = replace(recording, detections=boxes.select(~held_out))
-    output = (estimate_online if online else estimate_batch)(known, options, progress)
+    bare = replace(known, positions=None, measurements=(), absolute=None, closures=None)
+    output = (estimate_online if online else estimate_batch)(bare, options, progress)
+    output = with_measurements(output, known, options)
     result = conclude(output, boxes, held_out, options, reference)
     shown = result.detections
     return replace(
