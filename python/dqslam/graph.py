@@ -69,7 +69,7 @@ def build_graph(
     ------
     ValueError
         If there are no boxes, if a box has no object id, if there are absolute positions, which
-        ``with_absolute_positions`` adds to a graph, if a relative position is of an object
+        ``solve_with_absolute_positions`` takes, if a relative position is of an object
         without boxes or a size prior of a class without boxes, or if the core refuses the problem.
 
     Examples
@@ -82,7 +82,7 @@ def build_graph(
     """
     require(recording, Recording, "build_graph", "recording, truth = simulate(scenario, seed=0)")
     if recording.absolute is not None:
-        raise ValueError("absolute: with_absolute_positions(graph, absolute) adds them to a graph")
+        raise ValueError("absolute: solve_with_absolute_positions(graph, absolute) takes them")
     box_noise = BoxNoise() if box_noise is None else box_noise
     odometry, detections = recording.odometry, recording.detections
     object_ids, box_object, observations = _objects(detections)

@@ -112,7 +112,7 @@ def runs(tmp_path_factory):
     return found
 
 
-@pytest.mark.parametrize(("kind", "share"), [("positions", 0.8), ("closures", 0.6)])
+@pytest.mark.parametrize(("kind", "share"), [("positions", 0.8), ("closures", 0.9)])
 def test_measurements_improve_every_run(runs, kind, share):
     before = np.array([error for error, *_ in runs["none"]])
     after = np.array([error for error, *_ in runs[kind]])
