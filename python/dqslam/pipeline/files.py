@@ -8,7 +8,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-from dqslam import io
+from dqslam import _core, io
 from dqslam._files import results_directory, uninterrupted, write_text
 from dqslam.association import FINAL
 from dqslam.pipeline.conclude import RunResult
@@ -70,6 +70,7 @@ def run_files(
     8
     """
     options = options or RunFilesOptions()
+    _check_extras(options)
     if options.frames is None:
         times = io.choose_frame_times(odometry, detections, options.formats)
         options = replace(options, frames=times)
@@ -103,6 +104,15 @@ def run_files(
         if out is not None:
             _save(result, Path(out), beside or {})
     return result
+
+
+def _check_extras(options: RunFilesOptions) -> None:
+    """Refuse files of measurements that could take no part."""
+    extras = options.extras
+    if options.mode == _core.Mode.MAPPING and any(vars(extras).values()):
+        raise ValueError("measurements: mode MAPPING takes the poses for known, and has no use")
+    if extras.positions is not None and (options.ids == "none" or options.trust_ids != FINAL):
+        raise ValueError("positions: the ids of boxes must be final, or objects are not known")
 
 
 def _load(files: Sequence[str | Path], options: RunFilesOptions) -> tuple[Recording, io.Dropped]:

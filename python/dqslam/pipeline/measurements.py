@@ -17,21 +17,27 @@ from dqslam.recording import Recording
 from dqslam.uncertainty import marginal_covariances
 
 
-def check_measurements(recording: Recording, options: RunOptions) -> None:
-    """Refuse measurements that could take no part."""
+def usable_measurements(
+    recording: Recording, options: RunOptions
+) -> tuple[Recording, tuple[str, ...]]:
+    """Return the recording with the measurements that can take part, and why others cannot."""
     if not _has_any(recording):
-        return
+        return recording, ()
     if options.mode == _core.Mode.MAPPING:
-        raise ValueError("measurements: mode MAPPING takes the poses for known, and has no use")
-    if recording.positions is None:
-        return
-    ids = recording.detections.object_id
-    if options.trust_ids != FINAL or np.all(ids < 0):
-        raise ValueError("positions: the ids of boxes must be final, or objects are not known")
-    unknown = ~np.isin(recording.positions.object_id, ids)
-    if unknown.any():
-        name = recording.positions.object_id[np.argmax(unknown)]
-        raise ValueError(f"positions: object {name} has no box")
+        why = "measurements took no part: mode MAPPING takes the poses for known"
+        return replace(recording, positions=None, absolute=None, closures=None), (why,)
+    positions, ids = recording.positions, recording.detections.object_id
+    if positions is None:
+        return recording, ()
+    if options.trust_ids != FINAL:
+        why = "positions took no part: the ids of boxes must be final, or objects are not known"
+        return replace(recording, positions=None), (why,)
+    seen = np.isin(positions.object_id, ids)
+    if seen.all():
+        return recording, ()
+    name = positions.object_id[np.argmin(seen)]
+    why = f"{np.sum(~seen)} positions took no part: object {name} and the like have no box"
+    return replace(recording, positions=positions.select(seen)), (why,)
 
 
 def with_measurements(

@@ -16,7 +16,7 @@ from dqslam.pipeline.border import with_cut_edges
 from dqslam.pipeline.conclude import RunResult, conclude
 from dqslam.pipeline.hold_out import choose_held_out
 from dqslam.pipeline.lens import widened
-from dqslam.pipeline.measurements import check_measurements, with_measurements
+from dqslam.pipeline.measurements import usable_measurements, with_measurements
 from dqslam.pipeline.online import estimate_online
 from dqslam.pipeline.options import Progress, RunOptions
 from dqslam.recording import Recording
@@ -36,7 +36,7 @@ def run(
     not fit a world at rest are left out; without any object, the odometry is returned as it is.
     Positions of objects, absolute positions and loop closures take part in a last estimate of all
     poses and objects, whose boxes are known by then. With absolute positions, the result is in
-    their frame. Measurements of other kinds take no part.
+    their frame. Positions need final ids; measurements of other kinds take no part.
 
     Parameters
     ----------
@@ -56,9 +56,8 @@ def run(
     Raises
     ------
     ValueError
-        For ``online`` or measurements in mode MAPPING, positions without final ids, an option out
-        of range, final ids that a box lacks, size priors of a class that is not in the recording,
-        or a reference of another time.
+        For ``online`` in mode MAPPING, an option out of range, final ids that a box lacks, size
+        priors of a class that is not in the recording, or a reference of another time.
 
     Examples
     --------
@@ -76,7 +75,6 @@ def run(
     if reference is not None:  # before the work: may they be compared?
         common_poses(recording.timestamps, reference)
     recording = with_cut_edges(recording)
-    check_measurements(recording, options)
     camera = recording.camera
     recording, offset = widened(recording)
     boxes = recording.detections
@@ -84,11 +82,13 @@ def run(
         options.size_prior.check_classes(set(boxes.class_names.values()))
     if options.trust_ids < FINAL or np.all(boxes.object_id < 0):
         options = replace(options, trust_ids=min(options.trust_ids, UNSURE))
+    recording, remarks = usable_measurements(recording, options)
     held_out = choose_held_out(len(boxes), options.hold_out, seed=options.seed)
     known = replace(recording, detections=boxes.select(~held_out))
     bare = replace(known, positions=None, measurements=(), absolute=None, closures=None)
     output = (estimate_online if online else estimate_batch)(bare, options, progress)
     output = with_measurements(output, known, options)
+    output = replace(output, remarks=(*output.remarks, *remarks))
     result = conclude(output, boxes, held_out, options, reference)
     shown = result.detections
     return replace(
