@@ -8,6 +8,7 @@ import pytest
 import dqslam as dq
 from dqslam import _core, io
 from dqslam.lens import Lens, camera_with, distort_boxes, distorted_or_nan, outline_tilts
+from dqslam.online.inputs import box_noise_rows
 from dqslam.pipeline.lens import exact_boxes, widened
 
 SE3 = _core.PoseModel.SE3
@@ -137,3 +138,20 @@ def test_the_noise_of_a_detector_grows_where_the_lens_shrinks():
     across = 1 + (580.5 / 220) ** 2
     assert 0.8 * across < sigma[1, 0] < 1.25 * across
     np.testing.assert_array_equal(noise.covariance(box), np.tile(np.eye(4), (2, 1, 1)))
+
+
+def test_a_session_has_the_noise_of_the_batch():
+    camera = camera_with(dq.Camera(220, 220, 319.5, 239.5, 640, 480), FISHEYE)
+    box = np.array([[315.0, 235.0, 325.0, 245.0], [900.0, 235.0, 930.0, 245.0]])
+    noise = dq.BoxNoise(pixels=1.5, relative=0.1)
+    rows = box_noise_rows(noise, box, camera)
+    np.testing.assert_allclose(rows.reshape(2, 4, 4), noise.covariance(box, camera))
+
+
+def test_a_recording_through_a_lens_is_replayed_step_by_step():
+    recording, truth, _ = through(*CASES["fisheye"])
+    result = dq.run(recording, online=True)
+    nearest = np.linalg.norm(result.estimate.centers[:, None] - truth.center, axis=2).min(axis=1)
+    assert len(nearest) == 8
+    assert nearest.max() < 0.02
+    assert result.estimate.camera is recording.camera
