@@ -73,6 +73,15 @@ def test_lists_under_many_names(tmp_path, key, given, expected):
         ({"is_fisheye": True, "dist": FISHEYE}, Lens("equidistant", tuple(FISHEYE))),
         ({"is_fisheye": False, "dist": FIVE}, Lens("plumb_bob", tuple(FIVE))),
         ({"model": "fov", "coeffs": [0.9]}, Lens("fov", (0.9,))),
+        (
+            {"distortion": {"model": "fisheye", "coefficients": FISHEYE}},
+            Lens("equidistant", tuple(FISHEYE)),
+        ),
+        (
+            {"distortion": {"type": "kannala_brandt", "k1": 0.1, "k2": 0, "k3": 0, "k4": 0}},
+            Lens("equidistant", (0.1, 0, 0, 0)),
+        ),
+        ({"camera": {"intrinsics": {"fx": 500.5, "D": FIVE}}}, Lens("plumb_bob", tuple(FIVE))),
         ({"model": "none", "coeffs": [0] * 5}, Lens("plumb_bob", (0,) * 5)),
         # What is said twice agrees, and a device is no model of a lens.
         ({"k1": 0.1, "dist": [0.1, 0, 0, 0]}, Lens("plumb_bob", (0.1, 0, 0, 0, 0))),
@@ -105,6 +114,7 @@ def test_models(tmp_path, changes, expected):
         ({"crop": [0, 0, 10, 10]}, r":8: crop is not known"),
         ({"skew": 0.1}, r":8: skew is not known"),
         ({"rectified": True, "D": FIVE}, r":8: rectified is true, but there is a lens: D"),
+        ({"intrinsics": {"fx": 501.0}}, r":2: fx is given twice, as 500.5 and 501.0"),
         ({"image_width": 641}, r":8: width is 640 by width, but 641 by image_width"),
         ({"fx": 10**400}, r":2: fx is inf, not finite"),
         ({"K": [[1, 0, 320.25], [0, 501, 240], [0, 0, 1]]}, r"fx is 500.5 by fx, but 1 by K"),
@@ -122,6 +132,11 @@ def test_what_contradicts_or_is_not_known_is_refused(tmp_path, changes, message)
         {"K": [[500.5, 0, 320.25], [0, 501, 240], [0, 0, 1]], "w": 640, "h": 480},
         {"camera_matrix": [500.5, 0, 320.25, 0, 501, 240, 0, 0, 1], "image_size": [640, 480]},
         {"intrinsics": [500.5, 501, 320.25, 240], "resolution": [640, 480]},
+        {"camera": PLAIN},
+        {
+            "intrinsics": {"fx": 500.5, "fy": 501, "cx": 320.25, "cy": 240},
+            **{"width": 640, "height": 480},
+        },
         {"f": [500.5, 501], "ppx": 320.25, "ppy": 240, "imageWidth": 640, "imageHeight": 480},
         {
             "cameraMatrix": {

@@ -38,6 +38,7 @@ _MATRICES = (
     *("k", "m", "mtx", "kmatrix", "cameramatrix", "intrinsicmatrix", "intrinsicsmatrix"),
     *("intrinsics", "intrinsic", "cameraintrinsics", "cameraintrinsic"),
 )
+_TABLES = ("intrinsics", "intrinsic", "cameraintrinsics", "cameraintrinsic", "camera", "cam")
 _SIZES = ("resolution", "imagesize", "imagedimensions")
 _LISTS = (
     *("distortion", "distortions", "distk1k2p1p2k3", "dist", "d", "coeffs", "coefs"),
@@ -69,6 +70,7 @@ def camera_of_names(
     ``harmless`` are keys of the format that are no part of the camera. ``transform`` changes the
     intrinsics by name before they are checked.
     """
+    table = _unfolded(table)
     spelt = {plain(str(key)): str(key) for key in table.values}
     used: set[str] = set()
     values, keys = _intrinsics(table, spelt, used)
@@ -81,6 +83,20 @@ def camera_of_names(
     return make_camera(
         table.path, transform(values), lens, lambda key: table.line_of(keys.get(key, key))
     )
+
+
+def _unfolded(table: Table) -> Table:
+    """Return a table with the values of the tables of intrinsics or of a camera that are in it."""
+    values: dict[str, Any] = {}
+    for key, value in table.values.items():
+        inner = {key: value}
+        if plain(str(key)) in _TABLES and isinstance(value, Mapping) and "data" not in value:
+            inner = dict(_unfolded(table.part(value)).values)
+        for name, one in inner.items():
+            if name in values and values[name] != one:
+                raise table.error(f"{name} is given twice, as {values[name]} and {one}", str(name))
+            values[name] = one
+    return table.part(values)
 
 
 def _intrinsics(
@@ -120,9 +136,6 @@ def _intrinsics(
 
 def _of_matrix(table: Table, key: str) -> dict[str, float]:
     """Return fx fy cx cy of a list of these, or of a matrix, by rows or by columns."""
-    given = table.values[key]
-    if isinstance(given, Mapping) and "data" not in given:
-        return {}  # a table of its own, which its format reads
     cells = table.numbers(key)
     if len(cells) == 4:
         return dict(zip(("fx", "fy", "cx", "cy"), cells, strict=True))
@@ -180,6 +193,9 @@ def _named(table: Table, name: str, family: str | None) -> Lens:
     spelt = {plain(str(key)): str(key) for key in table.values}
     used: set[str] = set()
     family = _family(table, spelt, used) or family
+    lists = _keys(spelt, _LISTS)
+    if len(lists) == 1 and len(spelt) == len(used) + 1:
+        return lens_of_list(family or "polynomial", table.numbers(lists[0]))
     unknown = [key for one, key in spelt.items() if one not in COEFFICIENTS and key not in used]
     if unknown:
         raise table.error(
