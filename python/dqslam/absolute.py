@@ -54,7 +54,8 @@ def solve_with_absolute_positions(
     Returns
     -------
     estimate, marginals
-        In the frame of the positions, in which the first pose, too, has a covariance.
+        In the frame of the positions, in which the first pose, too, has a covariance. The initial
+        poses of the estimate are those of the odometry, from the estimated first pose on.
     summary
         Of the last solve.
 
@@ -119,7 +120,7 @@ def solve_with_absolute_positions(
         found,
         timestamps=graph.timestamps,
         poses=poses,
-        initial_poses=framed.core.initial_poses[1:] if start is None else start.initial_poses,
+        initial_poses=_from_first(model, estimate.initial_poses, poses[0]),
         dropped={**dropped, **found.dropped},
     )
     unknown = tuple(
@@ -128,6 +129,13 @@ def solve_with_absolute_positions(
     )
     marginals = replace(marginals, poses=marginals.poses[1:], under_constrained=unknown)
     return in_frame, marginals, summary
+
+
+def _from_first(model: _core.PoseModel, path: Floats, first: Floats) -> Floats:
+    """Return a path (n, d) moved so that it begins at a pose (d,)."""
+    count = len(path)
+    steps = _core.between(model, np.tile(path[0], (count, 1)), path)
+    return _core.compose(model, np.tile(first, (count, 1)), steps)
 
 
 def _plane(model: _core.PoseModel) -> bool:

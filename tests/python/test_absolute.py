@@ -68,6 +68,10 @@ def test_the_objects_move_with_the_frame():
     expected = _core.compose(dq.PoseModel.SE3, frame, centers)[:, :3]
     assert np.linalg.norm(estimate.centers - expected, axis=1).max() < 0.05
     plain, _ = dq.solve(graph)
+    np.testing.assert_allclose(estimate.initial_poses[0], estimate.poses[0], atol=1e-12)
+    path = estimate.initial_poses
+    steps = _core.between(graph.core.pose_model, path[:-1], path[1:])
+    np.testing.assert_allclose(steps, recording.odometry.relative, atol=1e-9)
     np.testing.assert_allclose(estimate.semi_axes, plain.semi_axes, rtol=0.1)
 
 
