@@ -11,6 +11,7 @@ if TYPE_CHECKING:  # the one list of public names, a line each: lazy_exports rea
     from dqslam import evaluation as evaluation
     from dqslam import inspection as inspection
     from dqslam import io as io
+    from dqslam import lens as lens
     from dqslam import metrics as metrics
     from dqslam import online as online
     from dqslam import pipeline as pipeline
@@ -36,6 +37,7 @@ if TYPE_CHECKING:  # the one list of public names, a line each: lazy_exports rea
     from dqslam._core import StepReport as StepReport
     from dqslam._core import Summary as Summary
     from dqslam._core import VariableKind as VariableKind
+    from dqslam.absolute import solve_with_absolute_positions as solve_with_absolute_positions
     from dqslam.association import Association as Association
     from dqslam.association import associate as associate
     from dqslam.assumptions import BoxNoise as BoxNoise
@@ -49,12 +51,15 @@ if TYPE_CHECKING:  # the one list of public names, a line each: lazy_exports rea
     from dqslam.calibration import solve_with_calibration as solve_with_calibration
     from dqslam.estimate import Estimate as Estimate
     from dqslam.evaluation import evaluate_results as evaluate_results
+    from dqslam.exchange import pose_graph as pose_graph
     from dqslam.graph import Graph as Graph
     from dqslam.graph import build_graph as build_graph
     from dqslam.graph import solve as solve
     from dqslam.io import load_recording as load_recording
     from dqslam.io import load_results as load_results
     from dqslam.io import save_estimate as save_estimate
+    from dqslam.lens import Lens as Lens
+    from dqslam.lens import LensCamera as LensCamera
     from dqslam.metrics import Report as Report
     from dqslam.metrics import absolute_trajectory_error as absolute_trajectory_error
     from dqslam.metrics import align_rigid as align_rigid
@@ -74,7 +79,9 @@ if TYPE_CHECKING:  # the one list of public names, a line each: lazy_exports rea
     from dqslam.pipeline import run as run
     from dqslam.pipeline import run_files as run_files
     from dqslam.plot import plot_maps as plot_maps
+    from dqslam.recording import AbsolutePositions as AbsolutePositions
     from dqslam.recording import Detections as Detections
+    from dqslam.recording import LoopClosures as LoopClosures
     from dqslam.recording import Measurements as Measurements
     from dqslam.recording import Odometry as Odometry
     from dqslam.recording import Recording as Recording

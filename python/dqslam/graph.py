@@ -9,7 +9,8 @@ from dqslam._checks import Bools, Floats, Ints, as_floats, reject_rows, require
 from dqslam._repr import counted
 from dqslam.assumptions import BoxNoise, SizePrior, SizePriors
 from dqslam.estimate import Estimate
-from dqslam.recording import Detections, Measurements, Recording
+from dqslam.lens import Lens, LensCamera, camera_with
+from dqslam.recording import Detections, LoopClosures, Measurements, Odometry, Recording
 
 # Where at least this share of all boxes fit, no box is suspected to show something else.
 TRUSTED_SHARE = 0.99
@@ -35,6 +36,8 @@ class Graph:
     """The class of most boxes of each object."""
     observations: Ints
     """Number of boxes of each object, shape (o,)."""
+    lens: Lens | None = None
+    """The lens of the camera, if the core does not know its model."""
 
     def __repr__(self) -> str:
         """Show the pose model, and how many poses, boxes and objects there are."""
@@ -65,7 +68,8 @@ def build_graph(
     Raises
     ------
     ValueError
-        If there are no boxes, if a box has no object id, if a relative position is of an object
+        If there are no boxes, if a box has no object id, if there are absolute positions, which
+        ``solve_with_absolute_positions`` takes, if a relative position is of an object
         without boxes or a size prior of a class without boxes, or if the core refuses the problem.
 
     Examples
@@ -77,29 +81,25 @@ def build_graph(
     Graph(SE2, 253 poses, 456 boxes of 10 objects)
     """
     require(recording, Recording, "build_graph", "recording, truth = simulate(scenario, seed=0)")
+    if recording.absolute is not None:
+        raise ValueError("absolute: solve_with_absolute_positions(graph, absolute) takes them")
     box_noise = BoxNoise() if box_noise is None else box_noise
     odometry, detections = recording.odometry, recording.detections
     object_ids, box_object, observations = _objects(detections)
     class_names = _class_names(detections, box_object, len(object_ids))
     priors = _size_priors(size_prior, class_names, detections)
-    steps = np.arange(len(odometry.relative))
     core = _core.Graph(
         odometry.pose_model,
         recording.camera,
         initial_poses=_core.dead_reckon(
             odometry.pose_model, odometry.first_pose, odometry.relative
         ),
-        odometry=_core.OdometryTable(
-            from_pose=steps,
-            to_pose=steps + 1,
-            relative=odometry.relative,
-            covariance=_flat(odometry.covariance),
-        ),
+        odometry=_odometry_table(odometry, recording.closures),
         boxes=_core.BoxTable(
             pose=detections.pose,
             object=box_object,
             box=detections.box,
-            covariance=_flat(box_noise.covariance(detections.box)),
+            covariance=_flat(box_noise.covariance(detections.box, recording.camera)),
             truncated=detections.truncated,
         ),
         size_prior=_core.SizePriorTable(
@@ -115,6 +115,7 @@ def build_graph(
         object_ids=object_ids,
         class_names=class_names,
         observations=observations,
+        lens=recording.camera.lens if isinstance(recording.camera, LensCamera) else None,
     )
 
 
@@ -168,7 +169,9 @@ def solve(
     kept = ~np.isin(graph.object_ids, list(unfit))
     estimate = Estimate(
         pose_model=graph.core.pose_model,
-        camera=graph.core.camera,
+        camera=graph.core.camera
+        if graph.lens is None
+        else camera_with(graph.core.camera, graph.lens),
         timestamps=graph.timestamps,
         poses=as_floats("solution.poses", solution.poses, initial_poses.shape),
         initial_poses=initial_poses,
@@ -218,6 +221,32 @@ def _size_priors(
         given.check_classes(set(detections.class_names.values()))
         return [given.of(name) for name in class_names]
     return [SizePrior() if given is None else given] * len(class_names)
+
+
+def _odometry_table(odometry: Odometry, closures: LoopClosures | None) -> _core.OdometryTable:
+    """Lay out the steps, then the closures, which the core has as odometry back in time."""
+    model, steps = odometry.pose_model, np.arange(len(odometry.relative))
+    tables = [(steps, steps + 1, odometry.relative, odometry.covariance)]
+    if closures is not None:
+        first, second = closures.from_pose, closures.to_pose
+        ahead = first < second
+        # The inverse of to_in_from has its error in the frame of the first pose.
+        adjoint = _core.adjoint(model, closures.relative)
+        moved = adjoint @ closures.covariance @ adjoint.transpose(0, 2, 1)
+        tables.append(
+            (
+                np.where(ahead, second, first),
+                np.where(ahead, first, second),
+                np.where(
+                    ahead[:, None], _core.inverse(model, closures.relative), closures.relative
+                ),
+                np.where(ahead[:, None, None], moved, closures.covariance),
+            )
+        )
+    from_pose, to_pose, relative, covariance = map(np.concatenate, zip(*tables, strict=True))
+    return _core.OdometryTable(
+        from_pose=from_pose, to_pose=to_pose, relative=relative, covariance=_flat(covariance)
+    )
 
 
 def _objects(detections: Detections) -> tuple[Ints, Ints, Ints]:

@@ -262,9 +262,10 @@ def test_cuts_are_made_at_the_same_time_between_keyframes():
     np.testing.assert_array_equal(_cut_alike(tracklet, pose, used, cut), expected)
 
 
-def test_one_pose_and_no_boxes():
+@pytest.mark.parametrize("names", [{1: "cup"}, {}])
+def test_one_pose_and_no_boxes(names):
     none = Detections(
-        pose=[], box=np.zeros((0, 4)), score=[], class_id=[], object_id=[], class_names={1: "cup"}
+        pose=[], box=np.zeros((0, 4)), score=[], class_id=[], object_id=[], class_names=names
     )
     odometry = Odometry(PoseModel.SE3, np.eye(7)[6], np.zeros((0, 7)), np.zeros((0, 6, 6)))
     made = table(0)

@@ -14,6 +14,7 @@ from dqslam.io import (
     read_mount,
     read_trajectory,
 )
+from dqslam.lens import Lens
 
 CAMERA = {"fx": 500.5, "fy": 501, "cx": 320.25, "cy": 240, "width": 640, "height": 480}
 BOXES = """frame,timestamp,x1,y1,x2,y2,score,class_id,class_name,track_id
@@ -165,7 +166,7 @@ def test_bad_mounts(tmp_path, text, message):
             "out.dat: its ending is of no format of detections",
         ),
         ("boxes.csv out.json --to tum", "boxes.csv: it is of detections, which tum is not"),
-        ("boxes.csv out.json --to bvh", "--to: format 'bvh' is none of rosbag, json, toml"),
+        ("boxes.csv out.json --to bvh", "--to: format 'bvh' is none of rosbag, realsense"),
         ("boxes.csv out.json --format bvh", "--format: format 'bvh' is none of rosbag"),
         ("boxes.csv out --to rosbag", "bags are read, not written"),
         ("boxes.csv out --to yolo", "out: yolo's boxes are shares of the image"),
@@ -244,3 +245,15 @@ def test_quiet_and_json(folder, call):
     assert call("camera.json c.toml --quiet") == ""
     (written,) = json.loads(call("boxes.csv boxes.json --json"))["written"]
     assert written == {"path": "boxes.json", "what": "2 boxes as coco", "loses": []}
+
+
+def test_one_of_several_cameras_is_converted_by_its_id(tmp_path, capsys):
+    rows = "1 PINHOLE 640 480 500 500 320 240\n2 OPENCV_FISHEYE 64 48 50 51 32 24 0.1 0 0 0\n"
+    (tmp_path / "cameras.txt").write_text(rows)
+    source, out = str(tmp_path / "cameras.txt"), str(tmp_path / "camera.json")
+    assert main(["convert", source, out, "--camera-id", "2"]) == 0
+    assert read_camera(out).lens == Lens("equidistant", (0.1, 0.0, 0.0, 0.0))
+    assert main(["convert", source, out]) == 2
+    assert "holds 2 cameras, 1, 2: choose one with --camera-id" in capsys.readouterr().err
+    assert main(["convert", source, out, "--to", "kalibr"]) == 2
+    assert "--to: kalibr is read, not written" in capsys.readouterr().err

@@ -34,5 +34,5 @@ def test_the_example(tmp_path, monkeypatch, capsys):
 def test_every_format_has_a_row():
     formats = (*io.CAMERA_FORMATS, *io.TRAJECTORY_FORMATS, *io.DETECTION_FORMATS)
     rows = [line for line in PAGE.splitlines() if line.startswith("| `")]
-    named = {name for row in rows for name in re.findall(r"`([\w-]+)`", row.split("|")[1])}
+    named = {name for row in rows for name in re.findall(r"`(\w[\w-]*)`", row.split("|")[1])}
     assert named == {format_.name for format_ in formats}

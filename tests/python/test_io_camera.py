@@ -59,12 +59,13 @@ def test_distortion_in_all_its_spellings(tmp_path, changes, distortion):
         ({"fx": None}, r":2: fx is None, not a number"),
         ({"fx": True}, r":2: fx is True, not a number"),
         ({"k1": float("nan")}, r":8: k1 is nan, not finite"),
-        ({"distortion": [0.1, 0.2]}, r":8: distortion is not a list of 4 or 5 numbers"),
-        ({"distortion": "none"}, r":8: distortion is not a list of 4 or 5 numbers"),
+        ({"distortion": [0.1, 0.2]}, r":8: distortion: is not a list of 4, 5, 8, 12 or 14"),
+        ({"distortion": "none"}, r":8: distortion is no list of numbers"),
         ({"distortion": [0, 0, 0, "a"]}, r":8: distortion is 'a', not a number"),
-        ({"distortion": {"k4": 0.1}}, r"distortion knows no k4, only k1 k2 p1 p2 k3"),
+        ({"distortion": {"k7": 0.1}}, r":9: distortion knows no k7, only k1 k2 p1 p2 k3"),
         ({"k1": 0.1, "distortion": [0] * 5}, r"distortion is given twice: distortion, k1"),
-        ({"model": "fisheye"}, r":8: model is fisheye; only pinhole"),
+        ({"model": "omni"}, r":8: model is omni: .* only pinhole, plumb_bob, rational"),
+        ({"model": "fisheye"}, r"the lens model is equidistant, but it has no coefficients"),
     ],
 )
 def test_bad_values_name_line_and_key(tmp_path, changes, message):

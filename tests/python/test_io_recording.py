@@ -51,14 +51,16 @@ def test_distorted_boxes_are_undistorted(files, orbit):
     np.testing.assert_allclose(left, original[:, 0], atol=0.1)
 
 
-def test_a_box_where_the_lens_has_no_inverse_is_named(files, orbit):
+def test_boxes_beyond_the_range_of_the_lens_are_left_out_and_counted(files, orbit):
     edit(files[0], lambda lines: [lines[0][:-1] + ', "distortion": [-0.9, 0, 0, 0]}'])
     times = orbit.times.tolist()
     places = ("300,238,302,240", "310,238,312,240", "0,0,2,2")
     rows = [f"{i},{times[i]!r},{place},0.9,1,cup,55" for i, place in enumerate(places)]
     add_rows(files[2], *rows)
-    with pytest.raises(FileError, match=r"boxes\.csv:164: the distortion in .*json has no"):
-        load_recording(*files)
+    recording, dropped = load_recording(*files)
+    assert (dropped.beyond_lens, dropped.below_min_score) == (1, 0)
+    assert dropped.few_boxes == {55: 2}
+    assert len(recording.detections) == len(orbit.boxes)
 
 
 def test_every_dropped_box_is_counted(files, orbit):

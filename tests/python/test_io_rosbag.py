@@ -95,14 +95,15 @@ class Bag:
         name = "vision_msgs/msg/Detection2DArray"
         return name, self.make(name, self.header(time), detections)
 
-    def camera(self):
-        region = self.make("sensor_msgs/msg/RegionOfInterest", 0, 0, 0, 0, False)
+    def camera(self, binning=0, region=(0, 0, 0, 0)):
+        region = self.make("sensor_msgs/msg/RegionOfInterest", *region, False)
         name = "sensor_msgs/msg/CameraInfo"
         k = np.array([500.5, 0, 320.25, 0, 501, 240, 0, 0, 1])
         p = np.insert(k, [3, 6, 9], 0.0)
         distortion = np.array([0.1, -0.2, 0.003, -0.004, 0.05])
         lens = ("plumb_bob", distortion, k, np.eye(3).ravel(), p)
-        return name, self.make(name, self.header(0.5, "camera"), 480, 640, *lens, 0, 0, region)
+        header = self.header(0.5, "camera")
+        return name, self.make(name, header, 480, 640, *lens, binning, binning, region)
 
     def write(self, path, topics, plugin=StoragePlugin.SQLITE3):
         with Writer(path, version=9, storage_plugin=plugin) as writer:
@@ -212,6 +213,14 @@ def test_what_is_no_bag(tmp_path, bag):
     path = bag.write(tmp_path / "bag", {"/odom": [bag.odometry(*ODOMETRY[0])]})
     with pytest.raises(FileError, match=r"no topic of sensor_msgs/msg/CameraInfo \(it has: /odom"):
         read_camera(path)
+
+
+def test_region_and_binning_of_a_camera(tmp_path, bag):
+    # x_offset, y_offset, height, width
+    message = bag.camera(binning=2, region=(20, 40, 400, 600))
+    camera = read_camera(bag.write(tmp_path / "bag", {"/info": [message]}))
+    found = (camera.fx, camera.fy, camera.cx, camera.cy, camera.width, camera.height)
+    assert found == (250.25, 250.5, 150.125, 100.0, 300, 200)
 
 
 def test_a_bag_of_ros_1(tmp_path):

@@ -105,19 +105,22 @@ def test_a_cube_has_the_size_of_its_side(tmp_path):
     assert set(objects.class_name) == {"cube"}
 
 
-def test_a_lens_with_distortion_is_refused(tmp_path):
+def test_boxes_are_written_as_the_lens_records_them(tmp_path):
     lens = _core.Camera(100.0, 100.0, 50.0, 50.0, 100, 100, distortion=[0.1, 0, 0, 0, 0])
+    boxes = [[20.0, 20, 29, 32], [21.0, 20, 29, 33], [22.0, 21, 29, 34]]
     recording = Recording(
         camera=lens,
-        timestamps=[0.0, 1.0],
-        odometry=Odometry(
-            _core.PoseModel.SE2, np.zeros(3), np.array([[1.0, 0, 0]]), np.eye(3)[None]
-        ),
-        detections=Detections([0], [[1, 1, 2, 2]], [1.0], [0], [0], {0: "cup"}),
+        timestamps=[0.0, 1.0, 2.0],
+        odometry=Odometry.from_poses(np.eye(3), covariance=np.eye(3)),
+        detections=Detections([0, 1, 2], boxes, [1.0] * 3, [0] * 3, [0] * 3, {0: "cup"}),
     )
-    with pytest.raises(ValueError, match=r"recording\.camera: boxes of a lens with distortion"):
-        io.save_recording(recording, tmp_path)
-    assert not list(tmp_path.iterdir())
+    io.save_recording(recording, tmp_path)
+    files = [tmp_path / name for name in ("camera.json", "odometry.txt", "boxes.csv")]
+    again, _ = io.load_recording(*files)
+    np.testing.assert_allclose(again.detections.box, boxes, atol=1e-5)
+    # Points 30 px from the middle are recorded 1 + 0.1 * 0.3^2 times as far from it, or more.
+    first = np.loadtxt(files[2], delimiter=",", skiprows=1, usecols=(2, 3))[0]
+    assert np.all((first < 19.8) & (first > 19.0))
 
 
 @pytest.mark.parametrize(

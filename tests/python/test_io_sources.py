@@ -16,7 +16,10 @@ def test_names_are_sorted_by_kind():
 
 
 def test_unknown_and_double_names():
-    known = "rosbag, json, .*, tum, kitti, .*, yolo, .*, coco, mot, kitti-tracking, csv"
+    known = (
+        "rosbag, .*json, toml, .*ros, colmap, kitti-calib, .*tum, kitti, .*, yolo, .*, coco, mot, "
+        "kitti-tracking, csv"
+    )
     with pytest.raises(ValueError, match=f"format 'bvh' is none of {known}"):
         split_formats(["tum", "bvh"])
     with pytest.raises(ValueError, match="formats tum and kitti are both of trajectory"):

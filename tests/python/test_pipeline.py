@@ -98,11 +98,20 @@ def test_size_priors_of_classes_are_reported_and_checked(files, online):
 
 
 @pytest.mark.parametrize("online", [False, True])
-def test_relative_positions_take_no_part(files, online):
+def test_relative_positions_take_part_with_final_ids_only(files, online):
     recording, _ = load_recording(*files)
     wrong = RelativePositions([5], [101], [[0.0, 0.0, 50.0]], [1e-6 * np.eye(3)])
-    with_them = run(replace(recording, positions=wrong), online=online).estimate
-    np.testing.assert_array_equal(with_them.poses, run(recording, online=online).estimate.poses)
+    told = replace(recording, positions=wrong)
+    plain = run(recording, online=online).estimate
+    moved = run(told, online=online).estimate
+    assert np.abs(moved.poses - plain.poses).max() > 0.01  # it is wrong by meters
+    doubtful = RunOptions(trust_ids=0.9)
+    without = run(told, doubtful, online=online)
+    assert "positions took no part: the ids of boxes must be final" in str(
+        without.report["warnings"]
+    )
+    plain = run(recording, doubtful, online=online).estimate
+    np.testing.assert_array_equal(without.estimate.poses, plain.poses)
 
 
 def test_boxes_without_ids_give_the_same_map(files, orbit):

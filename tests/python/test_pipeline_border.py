@@ -11,6 +11,7 @@ from dqslam.assumptions import BoxNoise, SizePrior
 from dqslam.estimate import Estimate
 from dqslam.graph import build_graph, solve
 from dqslam.io import load_recording
+from dqslam.lens import undistort_boxes
 from dqslam.pipeline import RunOptions, run
 from dqslam.pipeline.border import cut_edges, with_cut_edges
 from dqslam.pipeline.report import box_chi2, describe_boxes
@@ -24,7 +25,7 @@ def test_edges_on_the_border_are_told_from_edges_inside():
     expected = [[True, False, False, True], [False, True, True, False], [False] * 4]
     np.testing.assert_array_equal(cut_edges(camera, np.array(box)), expected)
     lens = _core.Camera(500, 500, 320, 240, 640, 480, distortion=[-0.3, 0.1, 0, 0, 0])
-    undistorted = lens.undistort_boxes(np.array(box[:2]))
+    undistorted = undistort_boxes(lens, np.array(box[:2]))
     assert undistorted[0, 0] < -20
     np.testing.assert_array_equal(cut_edges(lens, undistorted), expected[:2])
 

@@ -53,6 +53,20 @@ def test_no_boxes_leave_the_odometry(files):
     assert_is_odometry(held_out, recording)
 
 
+@pytest.mark.parametrize("online", [False, True])
+@pytest.mark.parametrize("names", [{}, {0: "cup"}])
+def test_a_recording_without_any_box_says_so(files, names, online):
+    recording, _ = load_recording(*files)
+    boxes = recording.detections.select(np.zeros(len(recording.detections), dtype=bool))
+    recording = replace(recording, detections=replace(boxes, class_names=names))
+    result = run(recording, online=online)
+    odometry = recording.odometry
+    path = _core.dead_reckon(odometry.pose_model, odometry.first_pose, odometry.relative)
+    np.testing.assert_allclose(result.estimate.poses, path, rtol=0, atol=1e-12)
+    assert result.estimate.object_ids.shape == (0,)
+    assert "there is no box: the trajectory is the odometry" in result.report["warnings"]
+
+
 def test_an_object_of_too_few_boxes_is_named(files):
     recording, _ = load_recording(*files)
     lamp = np.flatnonzero(recording.detections.object_id == 105)

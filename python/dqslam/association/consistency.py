@@ -126,6 +126,8 @@ def find_misfits(scene: SceneMap) -> dict[ObjectRow, str]:
     should be: there, most may move.
     """
     alive = np.flatnonzero(scene.labels.box_counts > 0)
+    if not alive.size:  # there may be no classes either
+        return {}
     log_size = scene.log_sizes()
     called = scene.labels.votes.argmax(axis=1)
     misfits: dict[ObjectRow, str] = {}

@@ -16,6 +16,7 @@ from dqslam.association.labels import Labels
 from dqslam.association.noise import StepNoise, corrected
 from dqslam.assumptions import BoxNoise, OdometryNoise, SizePrior, SizePriors
 from dqslam.graph import Graph, build_graph
+from dqslam.lens import edge_scales
 from dqslam.recording import Recording
 
 # Of an object that nothing is known of yet: a hand's breadth to a car.
@@ -67,7 +68,7 @@ class SceneMap:
         """What the boxes are called beyond this map, shape (m,)."""
         self.box_noise = box_noise
         self.learns_box_noise = learns_box_noise
-        self.box_covariance = box_noise.covariance(detections.box)
+        self.box_covariance = box_noise.covariance(detections.box, recording.camera)
         self.mode = mode
         self.learns_size = size_prior is None
         self.size_prior = first_size if size_prior is None else size_prior
@@ -260,14 +261,17 @@ class SceneMap:
         )
         used = in_front & ~boxes.truncated.any(axis=1) & (chi2 <= GATE[4])
         side = np.tile(boxes.box[:, 2:] - boxes.box[:, :2], (1, 2))
+        scale = edge_scales(self.recording.camera, boxes.box)
         better = corrected_boxes(
             self.box_noise,
-            (boxes.box - projected)[used].ravel(),
-            side[used].ravel(),
+            ((boxes.box - projected) / scale)[used].ravel(),
+            (side / scale)[used].ravel(),
             fit.box_redundancy / max(int(np.sum(~boxes.truncated)), 1),
         )
         self.box_noise = within_limits(better)
-        self.box_covariance = self.box_noise.covariance(self.recording.detections.box)
+        self.box_covariance = self.box_noise.covariance(
+            self.recording.detections.box, self.recording.camera
+        )
 
     def _believe_noise(self) -> None:
         if self.step_noise is None:

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from dqslam._checks import Floats
-from dqslam._core import PoseModel
+from dqslam._core import Camera, PoseModel
+from dqslam.lens import edge_scales
 
 # Sigmas of odometry outside of this range mean exact or useless odometry, and their squares are
 # badly conditioned.
@@ -21,18 +22,23 @@ class BoxNoise:
     """
 
     pixels: float = 2.0
-    """Constant part of sigma, pixels."""
+    """Constant part of sigma, pixels of the image as recorded."""
     relative: float = 0.05
     """Part of sigma that is proportional to the side of the box, as a share of the side."""
 
-    def covariance(self, box: Floats) -> Floats:
-        """Return the covariance [px^2] of u_min, v_min, u_max, v_max, shape (b, 4, 4)."""
+    def covariance(self, box: Floats, camera: Camera | None = None) -> Floats:
+        """Return the covariance [px^2] of u_min, v_min, u_max, v_max, shape (b, 4, 4).
+
+        The boxes are those of the pinhole of ``camera``. Its lens enlarges the detector's pixels
+        there; without a camera it does not.
+        """
         if not (np.isfinite([self.pixels, self.relative]).all() and self.pixels > 0.0):
             raise ValueError(f"box noise: expected positive, finite pixels, got {self}")
         if self.relative < 0.0:
             raise ValueError(f"box noise: relative is negative: {self}")
         side = np.tile(box[:, 2:] - box[:, :2], (1, 2))
-        variance = self.pixels**2 + (self.relative * side) ** 2
+        scale = 1.0 if camera is None else edge_scales(camera, box)
+        variance = (self.pixels * scale) ** 2 + (self.relative * side) ** 2
         return np.asarray(variance[:, :, None] * np.eye(4))
 
 

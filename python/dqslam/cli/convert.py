@@ -7,6 +7,7 @@ import typer
 
 from dqslam._input import refuse_shared_input
 from dqslam.cli.options import (
+    CameraId,
     CameraInBody,
     FirstFrame,
     FrameRate,
@@ -24,7 +25,7 @@ from dqslam.cli.settings import ConfigFile
 
 def convert(
     source: Annotated[
-        Path, typer.Argument(metavar="IN", help="File, YOLO folder, or bag to read.")
+        Path, typer.Argument(metavar="IN", help="File, YOLO folder, bag, or directory of results.")
     ],
     out: Annotated[Path, typer.Argument(metavar="OUT", help="File or folder to write.")],
     format_: Annotated[
@@ -37,6 +38,7 @@ def convert(
     camera: Annotated[
         Path | None, typer.Option(help="Camera file with the image size, which YOLO boxes need.")
     ] = None,
+    camera_id: CameraId = None,
     frame_times: FrameTimesFile = None,
     frame_rate: FrameRate = None,
     classes: Annotated[
@@ -51,11 +53,17 @@ def convert(
     nms: Nms = None,
     max_bad: MaxBad = 0.05,
     topics: Topics = None,
+    odometry_covariance: Annotated[
+        Path | None,
+        typer.Option(help="CSV of the covariance of each step, for pose graphs of results."),
+    ] = None,
     config: ConfigFile = None,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
     """Convert a camera, a trajectory or detections to another format, or a bag to a folder.
+
+    Directories of results are written as pose graphs, --to g2o or gtsam, or --to colmap-model.
 
     Formats: see docs/formats.md. All are read; written are json toml ros colmap kitti-calib, tum
     kitti euroc, csv coco yolo mot. IN may be a .gz file, or - for standard input.
@@ -64,15 +72,18 @@ def convert(
     from dqslam import io
 
     output = Output(quiet=quiet, as_json=json)
-    refuse_shared_input(source, camera, frame_times, classes, camera_in_body)
+    inputs = (source, camera, frame_times, classes, camera_in_body)
+    refuse_shared_input(*inputs, odometry_covariance)
     reading = given_reading(first_frame, max_bad, nms, topics, camera_in_body, image_size)
     size = reading.image_size
     if camera is not None:
-        lens = io.read_camera(camera, image_size=size)
+        lens = io.read_camera(camera, camera_id=camera_id, image_size=size)
         size = (lens.width, lens.height)
     notes = io.Notes(max_bad=max_bad)
     context = io.ConvertContext(
         size=size,
+        odometry_covariance=odometry_covariance,
+        camera_id=camera_id if camera is None else None,
         frames=given_frame_times(frame_times, frame_rate),
         first_frame=first_frame,
         classes=None if classes is None else io.read_class_names(classes),

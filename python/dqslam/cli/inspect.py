@@ -7,6 +7,7 @@ import typer
 from dqslam._input import refuse_shared_input
 from dqslam.cli.options import (
     CameraFile,
+    CameraId,
     CameraInBody,
     DetectionFile,
     FirstFrame,
@@ -39,6 +40,7 @@ def inspect(
     camera: CameraFile,
     odometry: OdometryFile,
     detections: DetectionFile,
+    camera_id: CameraId = None,
     formats: Formats = None,
     frame_times: FrameTimesFile = None,
     frame_rate: FrameRate = None,
@@ -77,7 +79,9 @@ def inspect(
     with output.steps("inspecting", 3) as done:
         frames = given_frame_times(frame_times, frame_rate)
         frames = frames or io.choose_frame_times(odometry, detections, names)
-        reading = given_reading(first_frame, max_bad, nms, topics, camera_in_body, image_size)
+        reading = given_reading(
+            first_frame, max_bad, nms, topics, camera_in_body, image_size, camera_id
+        )
         io.check_topics(camera, odometry, detections, reading)
         notes = io.Notes(max_bad=max_bad)
         lens = io.read_camera_file(camera, names, reading)

@@ -8,7 +8,15 @@ import typer
 if TYPE_CHECKING:
     from dqslam.io import FrameTimes, ReadOptions
 
-CameraFile = Annotated[Path, typer.Option(help="Camera file: JSON, TOML, ROS, COLMAP, KITTI, bag.")]
+CameraFile = Annotated[
+    Path, typer.Option(help="Camera file: JSON, TOML, ROS, OpenCV, Kalibr, COLMAP, KITTI, bag, ...")
+]
+CameraId = Annotated[
+    str | None,
+    typer.Option(
+        metavar="ID", help="Id of the camera, if the file has several: cam0, Camera1, 2, color."
+    ),
+]
 OdometryFile = Annotated[Path, typer.Option(help="Trajectory: TUM, KITTI, EuRoC, COLMAP, bag, ...")]
 DetectionFile = Annotated[
     Path, typer.Option(help="File or folder of boxes: CSV, COCO, YOLO, MOT, KITTI, bag, ...")
@@ -72,6 +80,17 @@ ImageSize = Annotated[
     typer.Option(
         metavar="WIDTHxHEIGHT", help="Size of the image in pixels, for a camera that has none."
     ),
+]
+PositionsFile = Annotated[
+    Path | None,
+    typer.Option(help="CSV of measured centers of objects in the camera frame, with final ids."),
+]
+AbsoluteFile = Annotated[
+    Path | None,
+    typer.Option(help="CSV of positions of the camera in a frame of their own, like GPS."),
+]
+ClosuresFile = Annotated[
+    Path | None, typer.Option(help="CSV of relative poses of the camera: loop closures.")
 ]
 MaxTimeDifference = Annotated[
     float | None,
@@ -150,6 +169,7 @@ def given_reading(
     topics: list[str] | None,
     camera_in_body: Path | None,
     image_size: str | None,
+    camera_id: str | None = None,
 ) -> "ReadOptions":
     """Return how files are read from these options."""
     from dqslam import io
@@ -162,4 +182,5 @@ def given_reading(
         topics=tuple(topics or ()),
         body_from_camera=None if mount is None else tuple(mount.tolist()),
         image_size=given_image_size(image_size),
+        camera_id=camera_id,
     )

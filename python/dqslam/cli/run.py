@@ -9,8 +9,11 @@ import typer
 
 from dqslam._input import refuse_shared_input
 from dqslam.cli.options import (
+    AbsoluteFile,
     CameraFile,
+    CameraId,
     CameraInBody,
+    ClosuresFile,
     DetectionFile,
     FirstFrame,
     Formats,
@@ -21,6 +24,7 @@ from dqslam.cli.options import (
     MaxTimeDifference,
     Nms,
     OdometryFile,
+    PositionsFile,
     ResultDirectory,
     Topics,
     given_frame_times,
@@ -45,6 +49,7 @@ def run(
     min_score: Annotated[
         float, typer.Option(help="Leave out boxes with a lower score, 0 to 1.")
     ] = 0.5,
+    camera_id: CameraId = None,
     formats: Formats = None,
     frame_times: FrameTimesFile = None,
     frame_rate: FrameRate = None,
@@ -100,6 +105,9 @@ def run(
             help="CSV of the covariance of each step, m and rad squared, instead of one sigma."
         ),
     ] = None,
+    positions: PositionsFile = None,
+    absolute: AbsoluteFile = None,
+    closures: ClosuresFile = None,
     groundtruth: Annotated[
         Path | None, typer.Option(help="TUM trajectory to compare with, in any world frame.")
     ] = None,
@@ -136,7 +144,8 @@ def run(
     from dqslam.pipeline import RunFilesOptions, run_files
 
     inputs = (camera, odometry, detections, frame_times, camera_in_body)
-    refuse_shared_input(*inputs, odometry_covariance, groundtruth, size_priors)
+    measured = (odometry_covariance, positions, absolute, closures)
+    refuse_shared_input(*inputs, *measured, groundtruth, size_priors)
     added = parse_noise("--perturb-odometry", perturb_odometry)
     believed = parse_noise("--odometry-noise", odometry_noise)
     if odometry_covariance is not None and (added or believed):
@@ -151,10 +160,17 @@ def run(
         hold_out=hold_out,
         seed=seed,
         min_score=min_score,
+        extras=io.Extras(positions=positions, absolute=absolute, closures=closures),
         formats=io.split_formats(formats or []),
         frames=given_frame_times(frame_times, frame_rate),
         reading=given_reading(
-            first_frame, 0.0 if strict else max_bad, nms, topics, camera_in_body, image_size
+            first_frame,
+            0.0 if strict else max_bad,
+            nms,
+            topics,
+            camera_in_body,
+            image_size,
+            camera_id,
         ),
         max_time_difference=max_time_difference,
         added_noise=added,

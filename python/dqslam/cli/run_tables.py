@@ -91,6 +91,7 @@ def _left_out(dropped: dict[str, Any], ids: str) -> str:
     few = dropped["few_boxes"]
     reasons = {
         "below the least score": dropped["below_min_score"],
+        "beyond the range of the lens": dropped["beyond_lens"],
         f"without {ids}": dropped["without_id"],
         "without a pose of their time": dropped["without_pose"],
         "beside a better box of the same object": dropped["repeated"],

@@ -76,7 +76,7 @@ def fit_boxes(results: Results) -> BoxFits:
         objects.ellipsoids[row[mapped]],
     )
     noise = _noise(results)
-    variance = np.diagonal(noise.covariance(boxes.box), axis1=1, axis2=2)
+    variance = np.diagonal(noise.covariance(boxes.box, results.camera), axis1=1, axis2=2)
     residual = np.where(boxes.truncated, np.nan, predicted - boxes.box) / np.sqrt(variance)
     return BoxFits(boxes, row, predicted, residual, box_overlaps(results, boxes), noise)
 

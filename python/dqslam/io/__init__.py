@@ -2,6 +2,7 @@
 
 from dqslam.io.camera import CAMERA_FORMATS as CAMERA_FORMATS
 from dqslam.io.camera import read_camera as read_camera
+from dqslam.io.colmap_model import write_colmap_model as write_colmap_model
 from dqslam.io.convert import ConvertContext as ConvertContext
 from dqslam.io.convert import Written as Written
 from dqslam.io.convert import convert as convert
@@ -9,16 +10,26 @@ from dqslam.io.detections import DETECTION_FORMATS as DETECTION_FORMATS
 from dqslam.io.detections import DetectionTable as DetectionTable
 from dqslam.io.detections import read_class_names as read_class_names
 from dqslam.io.detections import read_detections as read_detections
+from dqslam.io.extras import Extras as Extras
 from dqslam.io.files import FileError as FileError
 from dqslam.io.files import write_json as write_json
 from dqslam.io.frames import FrameTimes as FrameTimes
 from dqslam.io.frames import frame_rate as frame_rate
 from dqslam.io.frames import read_frame_times as read_frame_times
 from dqslam.io.images import find_images as find_images
+from dqslam.io.measurements import read_absolute as read_absolute
+from dqslam.io.measurements import read_closures as read_closures
+from dqslam.io.measurements import read_positions as read_positions
 from dqslam.io.mount import read_mount as read_mount
+from dqslam.io.nearest import nearest_pose as nearest_pose
 from dqslam.io.notes import InputWarning as InputWarning
 from dqslam.io.notes import Notes as Notes
 from dqslam.io.ply import write_ply as write_ply
+from dqslam.io.pose_graph import LandmarkEdges as LandmarkEdges
+from dqslam.io.pose_graph import PoseGraph as PoseGraph
+from dqslam.io.pose_graph import pose_graph_of_results as pose_graph_of_results
+from dqslam.io.pose_graph import positions_of_boxes as positions_of_boxes
+from dqslam.io.pose_graph import write_g2o as write_g2o
 from dqslam.io.reading import ReadOptions as ReadOptions
 from dqslam.io.reading import check_topics as check_topics
 from dqslam.io.reading import read_boxes_file as read_boxes_file
@@ -26,7 +37,6 @@ from dqslam.io.reading import read_camera_file as read_camera_file
 from dqslam.io.reading import read_path_file as read_path_file
 from dqslam.io.recording import Dropped as Dropped
 from dqslam.io.recording import load_recording as load_recording
-from dqslam.io.recording import nearest_pose as nearest_pose
 from dqslam.io.results import BoxTable as BoxTable
 from dqslam.io.results import MapObjects as MapObjects
 from dqslam.io.results import Results as Results

@@ -13,12 +13,22 @@ from numpy.typing import ArrayLike
 from dqslam import _core
 from dqslam.io.camera import CAMERA_FORMATS, read_camera
 from dqslam.io.camera.rosbag import KIND as CAMERA_INFO
+from dqslam.io.colmap_model import write_colmap_model
 from dqslam.io.detections import DETECTION_FORMATS, DetectionTable, read_detections
 from dqslam.io.detections.rosbag import KIND as DETECTION_ARRAY
 from dqslam.io.files import FileError, whole_folder
-from dqslam.io.formats import Format, Progress, choose_format, guarded, no_progress
+from dqslam.io.formats import (
+    Format,
+    Progress,
+    choose_format,
+    guarded,
+    named_format,
+    no_progress,
+)
 from dqslam.io.frames import BY_NUMBER, FrameTimes, write_frame_times
 from dqslam.io.notes import Notes
+from dqslam.io.pose_graph import pose_graph_of_results, write_g2o
+from dqslam.io.results import load_results
 from dqslam.io.rosbag import NAME as BAG
 from dqslam.io.rosbag import bag_topics
 from dqslam.io.sources import KINDS, kind_of
@@ -37,6 +47,8 @@ FROM_BAG = {
     "trajectory": (TRAJECTORIES, "trajectory.txt", "tum"),
     "detections": ((DETECTION_ARRAY,), "boxes.csv", "csv"),
 }
+# What results are written as.
+FROM_RESULTS = ("g2o", "gtsam", "colmap-model")
 
 
 @dataclass(frozen=True)
@@ -57,6 +69,8 @@ class ConvertContext:
     first_frame: int | None = None  #: number of the first frame in the file
     classes: dict[int, str] | None = None
     body_from_camera: ArrayLike | None = None
+    camera_id: str | None = None  #: id of the camera, if the source has several
+    odometry_covariance: str | Path | None = None  #: covariances of the steps, of results
     nms: float | None = None  #: boxes that overlap a better one by this much are left out
     notes: Notes = field(default_factory=Notes)  #: collects what is left out and what is doubtful
 
@@ -77,21 +91,25 @@ def convert(
     ----------
     source, out
         Files or folders. A bag becomes a folder with camera.json, trajectory.txt and boxes.csv,
-        as far as it has these, unless ``to`` names one format.
+        as far as it has these, unless ``to`` names one format. A directory of results becomes a
+        pose graph, ``to`` g2o or gtsam, or a folder with COLMAP's text model, colmap-model.
     format, to
         Names of formats; by default the format of the source is recognized from the file, and
         that of the target from its ending.
     topics
         Topics of a bag that has several for a kind.
     context
-        Size of the image, times of frames, names of classes, mount of the camera.
+        Size of the image, times of frames, names of classes, mount of the camera, its id, and
+        the accuracy of odometry.
     progress
         Called with the share of a bag or a folder that has been read; not for other files.
     """
     source, out = Path(source), Path(out)
+    context = context or ConvertContext()
+    if (source / "map.json").is_file():
+        return _convert_results(source, out, to, context)
     if out.exists() and source.exists() and out.samefile(source):
         raise ValueError(f"{out}: the file would be written over itself")
-    context = context or ConvertContext()
     kind = _kind(source, format, to)
     if kind is not None:
         target = _target(out, to, kind)
@@ -116,6 +134,27 @@ def convert(
             written += [Written(out / one.path.name, one.what, one.loses) for one in more]
             share(1.0)
     return written
+
+
+def _convert_results(
+    source: Path, out: Path, to: str | None, context: ConvertContext
+) -> list[Written]:
+    """Write results for another program."""
+    if to is None and out.suffix.lower() == ".g2o":
+        to = "g2o"
+    results = load_results(source)
+    if to == "colmap-model":
+        write_colmap_model(out, results)
+        what = f"{len(results.poses)} images and {len(results.objects)} points as {to}"
+        return [Written(out, what, ("shapes of objects", "covariances"))]
+    if to not in FROM_RESULTS:
+        known = ", ".join(FROM_RESULTS)
+        raise ValueError(f"{source}: it is of results; name a format with --to: {known}")
+    graph = pose_graph_of_results(results, context.odometry_covariance)
+    write_g2o(out, graph, program="gtsam" if to == "gtsam" else "g2o")
+    what = f"{len(graph.poses)} poses, {len(graph.landmarks)} landmarks"
+    what += f" and {len(graph.landmark_edges)} edges to them as {to}"
+    return [Written(out, what, ("times", "shapes of objects"))]
 
 
 def _part_progress(progress: Progress, done: int, parts: int, share: float) -> None:
@@ -149,7 +188,10 @@ def _kind(source: Path, format_name: str | None, to: str | None) -> str | None:
 
 def _target(out: Path, to: str | None, kind: str) -> Format[Any]:
     if to is not None:
-        return choose_format(out, to, FORMATS[kind], kind)
+        target = named_format(to, FORMATS[kind], kind)
+        if target.write is None:
+            raise ValueError(f"--to: {to} is read, not written")
+        return target
     for format_ in FORMATS[kind]:
         if out.suffix.lower() in format_.endings:
             return format_
@@ -180,7 +222,13 @@ def _convert(
     progress: Progress,
 ) -> list[Written]:
     if kind == "camera":
-        camera = read_camera(source, format_name, topic=topic)
+        camera = read_camera(
+            source,
+            format_name,
+            topic=topic,
+            camera_id=context.camera_id,
+            image_size=context.size,
+        )
         return _write_camera(out, camera, target)
     origin = choose_format(source, format_name, FORMATS[kind], kind)
     frames = context.frames

@@ -10,7 +10,7 @@ from dqslam._checks import Floats
 from dqslam.io.files import FileError
 from dqslam.io.frames import FrameTimes
 from dqslam.io.image_names import ImageNameError, frames_of_images, image_name
-from dqslam.io.recording import nearest_pose
+from dqslam.io.nearest import nearest_pose
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".ppm", ".pgm", ".tif", ".tiff", ".webp")
 _NANOSECONDS = 1e15  # seconds would be after the year 30 000 000

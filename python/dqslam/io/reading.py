@@ -37,6 +37,8 @@ class ReadOptions:
     """Pose of the camera in the body of the trajectory, m and x y z w; None is the camera's own."""
     image_size: tuple[int, int] | None = None
     """Width and height of the image in px, for a camera file that has none."""
+    camera_id: str | None = None
+    """Id of the camera, in a file with several."""
 
     def __post_init__(self) -> None:
         """Check the topics."""
@@ -46,7 +48,13 @@ class ReadOptions:
 def read_camera_file(path: str | Path, formats: FormatNames, options: ReadOptions) -> _core.Camera:
     """Read the camera of a recording."""
     topic = topic_of(path, (CAMERA_INFO,), options.topics)
-    return read_camera(path, formats.camera, topic=topic, image_size=options.image_size)
+    return read_camera(
+        path,
+        formats.camera,
+        topic=topic,
+        camera_id=options.camera_id,
+        image_size=options.image_size,
+    )
 
 
 def read_path_file(

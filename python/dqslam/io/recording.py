@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dqslam import _core
 from dqslam.assumptions import OdometryNoise
 from dqslam.io.detections import DetectionTable
+from dqslam.io.extras import Extras
 from dqslam.io.files import FileError
 from dqslam.io.frames import FrameTimes
+from dqslam.io.nearest import nearest_pose
 from dqslam.io.notes import Notes
 from dqslam.io.reading import (
     ReadOptions,
@@ -24,6 +25,7 @@ from dqslam.io.reading import (
 )
 from dqslam.io.sources import FormatNames
 from dqslam.io.step_covariances import read_step_covariances
+from dqslam.lens import undistorted_or_nan
 from dqslam.recording import Detections, Odometry, Recording
 
 # With two boxes and a noisy path, the distance of an object cannot be separated from its size.
@@ -41,11 +43,13 @@ class Dropped:
     without_pose: int  #: boxes with no pose near enough in time
     repeated: int  #: boxes with a better one of the same object at the same pose
     few_boxes: dict[int, int]  #: number of boxes of each object id with fewer than 3
+    beyond_lens: int = 0  #: boxes that reach beyond the range of the lens model
 
     @property
     def total(self) -> int:
         """The number of all dropped boxes."""
         counted = self.below_min_score + self.without_id + self.without_pose + self.repeated
+        counted += self.beyond_lens
         return counted + sum(self.few_boxes.values())
 
 
@@ -64,6 +68,7 @@ def load_recording(
     frames: FrameTimes | None = None,
     reading: ReadOptions | None = None,
     notes: Notes | None = None,
+    extras: Extras | None = None,
 ) -> tuple[Recording, Dropped]:
     """Read a recording in SE(3), where the robot is the camera, and the numbers of dropped boxes.
 
@@ -98,6 +103,8 @@ def load_recording(
     notes
         Collects what is left out of the files and what is doubtful in them; by default these are
         warnings of Python, of the category ``InputWarning``.
+    extras
+        Files of other measurements: see ``io.measurements``.
 
     Raises
     ------
@@ -143,10 +150,13 @@ def load_recording(
     tolerance = 0.5 * float(np.median(np.diff(times)))
     if max_time_difference is not None:
         tolerance = max_time_difference
+    box = undistorted_or_nan(lens, table.box) if lens.has_distortion else table.box
     final = final_ids and ids != "none"
     rows, dropped = (_select if final else _select_images)(
-        table, object_id, pose, late, min_score, tolerance
+        table, object_id, pose, late, _scored(table, box, min_score), tolerance
     )
+    beyond = int(np.sum((table.score >= min_score) & ~np.isfinite(box).all(axis=1)))
+    dropped = replace(dropped, beyond_lens=beyond, below_min_score=dropped.below_min_score - beyond)
     if not rows.size:
         raise FileError(detections, _nothing_left(table, dropped, ids, tolerance, times))
     covariance = (odometry_noise or OdometryNoise()).covariance(len(path) - 1)
@@ -159,41 +169,19 @@ def load_recording(
         odometry=Odometry.from_poses(path, covariance=covariance),
         detections=Detections(
             pose=pose[rows],
-            box=_undistorted(lens, camera, table, rows),
+            box=box[rows],
             score=table.score[rows],
             class_id=table.class_id[rows],
             object_id=object_id[rows],
             class_names={number: name or str(number) for number, name in classes.items()},
         ),
-        positions=None,
     )
-    return recording, dropped
+    return (extras or Extras()).added_to(recording, max_time_difference), dropped
 
 
-def nearest_pose(
-    pose_times: NDArray[np.float64], times: NDArray[np.float64]
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Find the pose nearest in time to each of ``times`` (m,): its row, and the difference in s."""
-    after = np.clip(np.searchsorted(pose_times, times), 1, len(pose_times) - 1)
-    nearer_before = times - pose_times[after - 1] <= pose_times[after] - times
-    pose = (after - nearer_before).astype(np.int64)
-    return pose, np.abs(pose_times[pose] - times)
-
-
-def _undistorted(
-    lens: _core.Camera, camera: str | Path, table: DetectionTable, rows: NDArray[np.int64]
-) -> NDArray[np.float64]:
-    """Undistort boxes (m, 4); an error names the line of a box where the lens has no inverse."""
-    try:
-        return lens.undistort_boxes(table.box[rows])
-    except ValueError:
-        for row in rows:
-            try:
-                lens.undistort_boxes(table.box[row : row + 1])
-            except ValueError:
-                message = f"the distortion in {camera} has no inverse at this box"
-                raise table.error(int(row), message) from None
-        raise
+def _scored(table: DetectionTable, box: NDArray[np.float64], min_score: float) -> NDArray[np.bool_]:
+    """Tell which boxes have the least score and are not beyond the lens, shape (m,)."""
+    return np.asarray((table.score >= min_score) & np.isfinite(box).all(axis=1))
 
 
 def _object_ids(table: DetectionTable, ids: Ids) -> NDArray[np.int64]:
@@ -214,12 +202,11 @@ def _select(
     object_id: NDArray[np.int64],
     pose: NDArray[np.int64],
     late: NDArray[np.float64],
-    min_score: float,
+    scored: NDArray[np.bool_],
     tolerance: float,
 ) -> tuple[NDArray[np.int64], Dropped]:
     """Choose rows: one box per object and pose, at least 3 per object, by pose and object."""
     score = table.score
-    scored = score >= min_score
     named = scored & (object_id >= 0)
     timely = named & (late <= tolerance)
     rows = np.flatnonzero(timely)
@@ -244,11 +231,10 @@ def _select_images(
     object_id: NDArray[np.int64],
     pose: NDArray[np.int64],
     late: NDArray[np.float64],
-    min_score: float,
+    scored: NDArray[np.bool_],
     tolerance: float,
 ) -> tuple[NDArray[np.int64], Dropped]:
     """Choose rows, by pose: all boxes of the image that is nearest in time to each pose."""
-    scored = table.score >= min_score
     timely = scored & (late <= tolerance)
     rows = np.flatnonzero(timely)
     rows = rows[np.lexsort((rows, late[rows], pose[rows]))]
@@ -271,8 +257,8 @@ def _nothing_left(
     unnamed = "" if ids == "none" else f"{dropped.without_id} without {ids}, "
     return (
         f"no object is left of {len(table.line)} boxes: {dropped.below_min_score} below the least "
-        f"score, {unnamed}{dropped.without_pose} further than "
-        f"{tolerance:g} s from a pose (boxes {table.timestamp.min():.6f} to "
+        f"score, {dropped.beyond_lens} beyond the lens, {unnamed}{dropped.without_pose} further "
+        f"than {tolerance:g} s from a pose (boxes {table.timestamp.min():.6f} to "
         f"{table.timestamp.max():.6f} s, poses {times[0]:.6f} to {times[-1]:.6f} s), "
         f"{dropped.repeated} repeated, {sum(dropped.few_boxes.values())} of objects with fewer "
         f"than {FEWEST_BOXES}"

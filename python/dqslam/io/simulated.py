@@ -17,6 +17,7 @@ from dqslam.io.detections.table import DetectionTable
 from dqslam.io.files import write_text
 from dqslam.io.step_covariances import write_step_covariances
 from dqslam.io.trajectory import write_trajectory
+from dqslam.lens import distort_boxes
 from dqslam.recording import Recording, Truth
 
 
@@ -24,17 +25,16 @@ def save_recording(recording: Recording, directory: str | Path) -> None:
     """Write camera.json, odometry.txt, odometry_covariance.csv and boxes.csv: see `load_recording`.
 
     The odometry is written as the poses that it leads to, world_from_camera. The id of an object is
-    its track_id. Relative positions are left out, because no format has them.
+    its track_id. Boxes are those of the image as recorded. Relative positions are left out.
 
     Raises
     ------
     ValueError
-        If the lens has distortion, because files have boxes of the image as it was recorded.
+        If a box reaches beyond the range of the lens; then nothing is written.
     """
-    if recording.camera.has_distortion:
-        raise ValueError("recording.camera: boxes of a lens with distortion cannot be written")
     directory = Path(directory)
     odometry, boxes = recording.odometry, recording.detections
+    recorded = distort_boxes(recording.camera, boxes.box)
     path = _core.dead_reckon(odometry.pose_model, odometry.first_pose, odometry.relative)
     write_json_camera(directory / "camera.json", recording.camera)
     _write_path(directory / "odometry.txt", recording, odometry.pose_model, path)
@@ -45,7 +45,7 @@ def save_recording(recording: Recording, directory: str | Path) -> None:
         line=np.arange(2, len(boxes) + 2),
         frame=boxes.pose,
         timestamp=recording.timestamps[boxes.pose],
-        box=boxes.box,
+        box=recorded,
         score=boxes.score,
         class_id=boxes.class_id,
         class_name=tuple(boxes.class_names[number] for number in boxes.class_id.tolist()),
@@ -79,7 +79,8 @@ def save_truth(truth: Truth, recording: Recording, directory: str | Path) -> Non
     _write_table(directory / "objects.csv", names, columns)
     boxes = recording.detections
     if truth.box_object_id is not None:
-        columns = _columns(np.column_stack([recording.timestamps[boxes.pose], boxes.box]))
+        recorded = distort_boxes(recording.camera, boxes.box)
+        columns = _columns(np.column_stack([recording.timestamps[boxes.pose], recorded]))
         columns.append(truth.box_object_id.tolist())
         names = ["timestamp", "x1", "y1", "x2", "y2", "track_id"]
         _write_table(directory / "true_boxes.csv", names, columns)

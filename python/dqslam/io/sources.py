@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -14,6 +15,11 @@ from dqslam.io.formats import choose_format, guarded, look_at
 from dqslam.io.frames import BY_NUMBER, FrameTimes
 from dqslam.io.rosbag import bag_topics, looks_like_bag
 from dqslam.io.trajectory import TRAJECTORY_FORMATS
+
+# A key that a JSON has if it is of a camera, and that none of detections has.
+CAMERA_KEYS = re.compile(
+    r'"(fx|fl_x|ppx|f|focal(_length)?|K|[Cc]amera_?[Mm]atrix|intrinsics?|intrinsic_?[Mm]atrix)"\s*:'
+)
 
 
 class FormatNames(NamedTuple):
@@ -107,7 +113,7 @@ def kind_of(path: str | Path) -> str | None:
     if looks_like_bag(look):
         return None
     if look.suffix == ".json":
-        return "camera" if '"fx"' in read_text(path) else "detections"
+        return "camera" if CAMERA_KEYS.search(read_text(path)) else "detections"
     for kind, formats in (
         ("camera", CAMERA_FORMATS),
         ("trajectory", TRAJECTORY_FORMATS),

@@ -33,6 +33,7 @@ from dqslam import _core
 from dqslam._checks import Bools, Floats, Ints
 from dqslam.io.csv_table import CsvTable, read_csv
 from dqslam.io.files import FileError
+from dqslam.lens import undistort_boxes
 
 IDS = ("object_id", "track_id", "id")
 CLASSES = ("class_name", "class")
@@ -114,7 +115,7 @@ def read_true_boxes(
     box = _columns(table, EDGES)
     table.reject(np.any(box[:, 2:] <= box[:, :2], axis=1), "empty box: x1 < x2, y1 < y2")
     try:
-        box = camera.undistort_boxes(box)
+        box = undistort_boxes(camera, box)
     except ValueError as error:
         raise FileError(path, str(error)) from None
     return TrueBoxes(

@@ -4,6 +4,7 @@ import numpy as np
 
 from dqslam import _core
 from dqslam._checks import Floats, Ints
+from dqslam.lens import recorded_pixels
 
 # The lens model is used up to this share of the image's size outside of the image.
 _AROUND = 0.5
@@ -57,5 +58,5 @@ def through_lens(camera: _core.Camera, outlines: Floats) -> Floats:
     far = np.any((outlines < -_AROUND * size) | (outlines > (1.0 + _AROUND) * size), axis=-1)
     hidden = far | np.isnan(outlines).any(axis=-1)
     inside = np.where(hidden[..., None], [camera.cx, camera.cy], outlines)
-    bent = camera.distort_points(inside.reshape(-1, 2)).reshape(outlines.shape)
+    bent = recorded_pixels(camera, inside)
     return np.where(hidden[..., None], np.nan, bent)

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from dqslam import _core
 from dqslam._checks import Bools, Floats, Ints, as_covariances, reject_rows
 from dqslam.assumptions import BoxNoise
+from dqslam.lens import edge_scales
 from dqslam.online.integrated_odometry import identity_pose
 from dqslam.online.objects import Registry
 from dqslam.online.step import Motion, StepBoxes, StepMeasurements, StepPositions
@@ -114,10 +115,10 @@ def check_boxes(boxes: StepBoxes | None) -> CheckedBoxes:
     return CheckedBoxes(box, object_id.astype(np.int64), names, truncated)
 
 
-def box_noise_rows(noise: BoxNoise, box: Floats) -> Floats:
-    """Return the covariances of boxes (b, 4), shape (b, 16)."""
+def box_noise_rows(noise: BoxNoise, box: Floats, camera: _core.Camera) -> Floats:
+    """Return the covariances of boxes (b, 4) in the pinhole's image of a camera, shape (b, 16)."""
     rows = np.zeros((len(box), 16))
-    rows[:, ::5] = noise.pixels**2
+    rows[:, ::5] = (noise.pixels * edge_scales(camera, box)) ** 2
     if noise.relative:
         variance = (noise.relative * (box[:, 2:] - box[:, :2])) ** 2
         rows[:, 0::10] += variance[:, :1]  # of both edges in u

@@ -12,6 +12,7 @@ from dqslam import _core
 from dqslam._checks import Floats
 from dqslam._ids import ObjectId, ObjectRow
 from dqslam.io import FileError, load_results, save_estimate
+from dqslam.lens import camera_with, lens_of
 from dqslam.online.readout import read_estimate
 from dqslam.online.state import State
 from dqslam.recording import tangent_size
@@ -91,16 +92,7 @@ def _shape_covariance(semi_axes: Floats, orientation_xyzw: Floats, log_sigma: Fl
 def _with_mount(camera: _core.Camera, robot_from_camera: ArrayLike | None) -> _core.Camera:
     if robot_from_camera is None:
         return camera
-    return _core.Camera(
-        camera.fx,
-        camera.fy,
-        camera.cx,
-        camera.cy,
-        camera.width,
-        camera.height,
-        distortion=camera.distortion,
-        robot_from_camera=np.asarray(robot_from_camera, dtype=np.float64),
-    )
+    return camera_with(camera, lens_of(camera), robot_from_camera=robot_from_camera)
 
 
 def add_map(state: State, known: KnownMap) -> None:

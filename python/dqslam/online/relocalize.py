@@ -61,7 +61,7 @@ def relocalize(state: State, boxes: StepBoxes) -> Relocation:
         objects.ellipsoids,
         np.array(covariances).reshape(-1, 81),
         checked.box,
-        box_noise_rows(settings.box_noise, checked.box),
+        box_noise_rows(settings.box_noise, checked.box, settings.camera),
         checked.truncated,
         candidates,
         MIN_BOXES_WITH_IDS[settings.pose_model] if have_ids else MIN_BOXES_WITHOUT_IDS,

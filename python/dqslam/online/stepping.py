@@ -50,7 +50,7 @@ def take_step(
         observations = _core.StepObservations(
             object=object_rows,
             box=checked.box,
-            covariance=box_noise_rows(settings.box_noise, checked.box),
+            covariance=box_noise_rows(settings.box_noise, checked.box, settings.camera),
             truncated=checked.truncated,
             measurements=measurement_tables(positions, measurements, registry),
             log_size_mean=np.array([prior.log_mean for prior in priors]),

@@ -12,11 +12,16 @@ from dqslam import _core
 from dqslam.association import Association, associate, fill_in
 from dqslam.calibration import CalibrationFinding, check_calibration
 from dqslam.estimate import Estimate
-from dqslam.graph import solve
+from dqslam.graph import Graph, solve
 from dqslam.pipeline.conclude import EstimatorOutput
+from dqslam.pipeline.lens import with_exact_boxes
 from dqslam.pipeline.options import Progress, RunOptions
 from dqslam.recording import Recording
 from dqslam.uncertainty import Marginals, UnderConstrained, marginal_covariances
+
+# Boxes are undistorted again for the map until they move by less than this [px], or so many times.
+_LENS_PX = 0.02
+_LENS_ROUNDS = 4
 
 
 def estimate_batch(
@@ -63,7 +68,9 @@ def _finish(
     graph = found.scene.graph()
     if graph is None:
         return _nothing(recording, path, found.left_out), None, None, ()
-    solved, summary = solve(graph, options, start=found.scene.state(graph))
+    graph, solved, summary = _solve_exactly(
+        recording.camera, graph, found.scene.state(graph), options
+    )
     ids = found.ids[solved.object_ids]
     order = np.argsort(ids)
     order = order[ids[order] >= 0]  # those without a box, now that all images are seen, are gone
@@ -97,6 +104,28 @@ def _finish(
         with contextlib.suppress(RuntimeError, ValueError):
             findings = check_calibration(graph, solved, options)
     return estimate, marginals, summary, findings
+
+
+def _solve_exactly(
+    camera: _core.Camera, graph: Graph, start: _core.State, options: _core.SolveOptions
+) -> tuple[Graph, Estimate, _core.Summary]:
+    """Solve with boxes that are undistorted for the objects of the map, which they change a little.
+
+    Returns the problem with these boxes, too. Without distortion this is one solve.
+    """
+    boxes, state = graph.core.boxes.box, start
+    for _ in range(_LENS_ROUNDS):
+        before = graph.core.boxes.box
+        if camera.has_distortion:
+            core = with_exact_boxes(graph.core, camera, boxes, state)
+            graph = replace(graph, core=core)
+        solved, summary = solve(graph, options, start=state)
+        if np.abs(graph.core.boxes.box - before).max(initial=0.0) < _LENS_PX:
+            break
+        landmarks = state.landmarks.copy()
+        landmarks[np.isin(graph.object_ids, solved.object_ids)] = solved.ellipsoids
+        state = _core.State(solved.poses, landmarks)
+    return graph, solved, summary
 
 
 def _named(part: UnderConstrained, found: Association) -> UnderConstrained:

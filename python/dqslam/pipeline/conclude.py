@@ -16,6 +16,7 @@ from dqslam.estimate import Estimate
 from dqslam.evaluation import trajectory_error
 from dqslam.io import Trajectory
 from dqslam.pipeline.hold_out import describe_overlap, overlap_with_map
+from dqslam.pipeline.lens import detections_with_exact_boxes
 from dqslam.pipeline.options import RunOptions
 from dqslam.pipeline.report import (
     box_chi2,
@@ -95,7 +96,14 @@ def conclude(
     estimate, noise = output.estimate, output.odometry_noise
     object_id = boxes.object_id.copy()
     object_id[~held_out] = output.object_id
-    detections = replace(boxes, object_id=object_id)
+    detections = detections_with_exact_boxes(
+        estimate.camera,
+        estimate.pose_model,
+        estimate.poses,
+        estimate.object_ids,
+        estimate.ellipsoids,
+        replace(boxes, object_id=object_id),
+    )
     assigned = detections.select((object_id >= 0) & ~held_out)
     chi2 = box_chi2(estimate, assigned, output.box_noise)
     mapped = np.isin(assigned.object_id, estimate.object_ids)

@@ -8,7 +8,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-from dqslam import io
+from dqslam import _core, io
 from dqslam._files import results_directory, uninterrupted, write_text
 from dqslam.association import FINAL
 from dqslam.pipeline.conclude import RunResult
@@ -70,6 +70,7 @@ def run_files(
     8
     """
     options = options or RunFilesOptions()
+    _check_extras(options)
     if options.frames is None:
         times = io.choose_frame_times(odometry, detections, options.formats)
         options = replace(options, frames=times)
@@ -108,6 +109,15 @@ def run_files(
     return result
 
 
+def _check_extras(options: RunFilesOptions) -> None:
+    """Refuse files of measurements that could take no part."""
+    extras = options.extras
+    if options.mode == _core.Mode.MAPPING and any(vars(extras).values()):
+        raise ValueError("measurements: mode MAPPING takes the poses for known, and has no use")
+    if extras.positions is not None and (options.ids == "none" or options.trust_ids != FINAL):
+        raise ValueError("positions: the ids of boxes must be final, or objects are not known")
+
+
 def _load(
     files: Sequence[str | Path], options: RunFilesOptions, notes: io.Notes
 ) -> tuple[Recording, io.Dropped]:
@@ -124,6 +134,7 @@ def _load(
         frames=options.frames,
         reading=options.reading,
         notes=notes,
+        extras=options.extras,
     )
     if options.added_noise is not None:
         noisy = perturb_odometry(recording, options.added_noise, seed=options.seed).odometry
@@ -143,6 +154,10 @@ def _describe(options: RunFilesOptions) -> dict[str, Any]:
         "odometry_noise_added": None if added is None else asdict(added) | {"seed": options.seed},
         "odometry_noise_believed": None if believed is None else asdict(believed),
         "odometry_covariance": None if covariance is None else str(covariance),
+        "measurements": {
+            name: None if file is None else str(file)
+            for name, file in asdict(options.extras).items()
+        },
     }
 
 

@@ -15,6 +15,8 @@ from dqslam.pipeline.batch import estimate_batch
 from dqslam.pipeline.border import with_cut_edges
 from dqslam.pipeline.conclude import RunResult, conclude
 from dqslam.pipeline.hold_out import choose_held_out
+from dqslam.pipeline.lens import widened
+from dqslam.pipeline.measurements import usable_measurements, with_measurements
 from dqslam.pipeline.online import estimate_online
 from dqslam.pipeline.options import Progress, RunOptions
 from dqslam.recording import Recording
@@ -32,7 +34,10 @@ def run(
 
     Edges of boxes on the border of the image bound the object from one side only. Objects that do
     not fit a world at rest are left out; without any object, the odometry is returned as it is.
-    Relative positions and other measurements take no part.
+    The report warns of a recording without any box.
+    Positions of objects, absolute positions and loop closures take part in a last estimate of all
+    poses and objects, whose boxes are known by then. With absolute positions, the result is in
+    their frame. Positions need final ids; measurements of other kinds take no part.
 
     Parameters
     ----------
@@ -70,13 +75,27 @@ def run(
         raise ValueError("online: a session improves the odometry, it has no mode MAPPING")
     if reference is not None:  # before the work: may they be compared?
         common_poses(recording.timestamps, reference)
-    recording = replace(with_cut_edges(recording), positions=None, measurements=())
+    recording = with_cut_edges(recording)
+    camera = recording.camera
+    recording, offset = widened(recording)
     boxes = recording.detections
     if isinstance(options.size_prior, SizePriors):
         options.size_prior.check_classes(set(boxes.class_names.values()))
     if options.trust_ids < FINAL or np.all(boxes.object_id < 0):
         options = replace(options, trust_ids=min(options.trust_ids, UNSURE))
+    recording, remarks = usable_measurements(recording, options)
+    if not len(boxes):
+        remarks = ("there is no box: the trajectory is the odometry", *remarks)
     held_out = choose_held_out(len(boxes), options.hold_out, seed=options.seed)
     known = replace(recording, detections=boxes.select(~held_out))
-    output = (estimate_online if online else estimate_batch)(known, options, progress)
-    return conclude(output, boxes, held_out, options, reference)
+    bare = replace(known, positions=None, measurements=(), absolute=None, closures=None)
+    output = (estimate_online if online else estimate_batch)(bare, options, progress)
+    output = with_measurements(output, known, options)
+    output = replace(output, remarks=(*output.remarks, *remarks))
+    result = conclude(output, boxes, held_out, options, reference)
+    shown = result.detections
+    return replace(
+        result,
+        estimate=replace(result.estimate, camera=camera),
+        detections=replace(shown, box=shown.box - np.tile(offset, 2)),
+    )

@@ -37,7 +37,7 @@ def box_chi2(estimate: Estimate, detections: Detections, noise: BoxNoise) -> NDA
         estimate.poses[detections.pose],
         estimate.ellipsoids[row],
         detections.box,
-        noise.covariance(detections.box).reshape(-1, 16),
+        noise.covariance(detections.box, estimate.camera).reshape(-1, 16),
         detections.truncated,
     )
     return np.where(mapped, chi2, np.inf)

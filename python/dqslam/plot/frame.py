@@ -5,9 +5,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from dqslam import _core
 from dqslam._checks import Floats, Ints
 from dqslam.evaluation import BoxFits
 from dqslam.io import Results
+from dqslam.lens import distort_boxes, outline_tilts
 from dqslam.plot.style import GRAY
 
 if TYPE_CHECKING:
@@ -35,7 +37,7 @@ def draw_boxes(
     rows = np.flatnonzero(fits.boxes.pose == pose)
     boxes = fits.boxes.box[rows]
     if lens:
-        boxes = results.camera.distort_boxes(boxes)
+        boxes = distort_boxes(results.camera, boxes, _tilts(results, fits.object_row[rows], pose))
     for row, box in zip(rows, boxes, strict=True):
         seen = fits.object_row[row]
         color = unmapped if seen < 0 else styles[results.objects.class_names[seen]]["color"]
@@ -48,6 +50,16 @@ def draw_boxes(
             gid="detected" if seen >= 0 else "not mapped",
         )
     return np.unique(fits.object_row[rows][fits.object_row[rows] >= 0])
+
+
+def _tilts(results: Results, object_row: Ints, pose: int) -> Floats:
+    """Return the tilts of the outlines that boxes bound, (m,); NaN without an object in front."""
+    known = object_row >= 0
+    tilts = np.full(len(object_row), np.nan)
+    objects = results.objects.ellipsoids[object_row[known]]
+    here = np.tile(results.poses[pose], (len(objects), 1))
+    tilts[known] = outline_tilts(_core.PoseModel.SE3, results.camera, here, objects)
+    return tilts
 
 
 def rectangle(box: Floats) -> Floats:

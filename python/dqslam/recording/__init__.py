@@ -6,6 +6,8 @@ with whole numbers at pixel centers. d is the pose size (3 or 7), k the tangent 
 Every array is copied, checked and made read-only. Errors name the array and the row.
 """
 
+from dqslam.recording.closures import AbsolutePositions as AbsolutePositions
+from dqslam.recording.closures import LoopClosures as LoopClosures
 from dqslam.recording.detections import Detections as Detections
 from dqslam.recording.measurements import Measurements as Measurements
 from dqslam.recording.odometry import Odometry as Odometry

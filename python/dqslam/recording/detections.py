@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from dqslam._checks import Bools, Floats, Ints, as_floats, as_ints, assign, reject_rows
 from dqslam._core import Camera
 from dqslam._repr import counted
+from dqslam.lens import undistort_boxes
 from dqslam.recording.detectors import DetectedBoxes, read_supervision, read_ultralytics
 
 # Detectors count pixels from the corner of the image, we from the center of the first one.
@@ -112,7 +113,7 @@ class Detections:
             names = dict(enumerate(class_names))
         return cls(
             pose=as_ints("pose", _each(pose, count), count),
-            box=box if camera is None else camera.undistort_boxes(box),
+            box=box if camera is None else undistort_boxes(camera, box),
             score=as_floats("score", _each(1.0 if score is None else score, count), [count]),
             class_id=numbers,
             object_id=as_ints(

@@ -4,12 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dqslam._checks import Floats, Ints, as_floats, assign, reject_rows
+from dqslam._checks import Floats, as_floats, assign, reject_rows
 from dqslam._core import Camera
 from dqslam._repr import counted
+from dqslam.recording.closures import AbsolutePositions, LoopClosures, check_rows
 from dqslam.recording.detections import Detections, in_words
 from dqslam.recording.measurements import Measurements
 from dqslam.recording.odometry import Odometry
+from dqslam.recording.poses import as_poses
 from dqslam.recording.positions import RelativePositions
 
 
@@ -41,6 +43,8 @@ class Recording:
     positions: RelativePositions | None = None
     measurements: tuple[Measurements, ...] = ()
     """Other measurements, with one entry per kind."""
+    absolute: AbsolutePositions | None = None
+    closures: LoopClosures | None = None
 
     def __post_init__(self) -> None:
         """Check that the parts fit together."""
@@ -53,11 +57,17 @@ class Recording:
                 f"timestamps: expected {count}, one more than odometry.relative has rows, "
                 f"got {len(timestamps)}"
             )
-        _check_poses("detections.pose", self.detections.pose, count)
+        check_rows("detections.pose", self.detections.pose, count)
         if self.positions is not None:
-            _check_poses("positions.pose", self.positions.pose, count)
+            check_rows("positions.pose", self.positions.pose, count)
         for measured in self.measurements:
-            _check_poses(f"{measured.kind}s.pose", measured.pose, count)
+            check_rows(f"{measured.kind}s.pose", measured.pose, count)
+        if self.absolute is not None:
+            check_rows("absolute.pose", self.absolute.pose, count)
+        if self.closures is not None:
+            check_rows("closures.from_pose", self.closures.from_pose, count)
+            check_rows("closures.to_pose", self.closures.to_pose, count)
+            as_poses("closures.relative", self.closures.relative, self.odometry.pose_model)
         self._check_boxes_meet_image()
         assign(self, timestamps=timestamps)
 
@@ -76,8 +86,8 @@ class Recording:
         if self.positions is not None:
             parts.append(counted(len(self.positions), "position"))
         parts += [counted(len(measured), measured.kind) for measured in self.measurements]
+        if self.absolute is not None:
+            parts.append(counted(len(self.absolute), "absolute position"))
+        if self.closures is not None:
+            parts.append(counted(len(self.closures), "closure"))
         return f"Recording({', '.join(parts)})"
-
-
-def _check_poses(name: str, rows: Ints, count: int) -> None:
-    reject_rows(name, (rows < 0) | (rows >= count), f"no such pose (there are {count})", rows)

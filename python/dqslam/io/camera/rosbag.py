@@ -3,27 +3,31 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from dqslam import _core
 from dqslam.io.camera.ros import camera_of_info
+from dqslam.io.camera.tables import Table
 from dqslam.io.files import FileError
 from dqslam.io.formats import Format
 from dqslam.io.rosbag import LOOKS, NAME, looks_like_bag, messages
 
 KIND = "sensor_msgs/msg/CameraInfo"
-FIELDS = ("width", "height", "distortion_model")
+FIELDS = ("width", "height", "distortion_model", "binning_x", "binning_y")
+REGION = ("x_offset", "y_offset", "width", "height")
 
 
 def read_camera_info(path: str | Path, *, topic: str | None = None) -> _core.Camera:
     """Read the camera of a bag."""
     for _, message in messages(path, KIND, topic):
-        table = {name: getattr(message, name) for name in FIELDS}
+        values: dict[str, Any] = {name: getattr(message, name) for name in FIELDS}
+        values["roi"] = {name: getattr(message.roi, name) for name in REGION}
         for name in ("k", "d"):
-            values = getattr(message, name, None)
-            table[name] = (
-                values if values is not None else getattr(message, name.upper())
-            ).tolist()
-        return camera_of_info(path, table)
+            numbers = getattr(message, name, None)
+            if numbers is None:
+                numbers = getattr(message, name.upper())
+            values[name] = numbers.tolist()
+        return camera_of_info(Table(path, "", values))
     raise FileError(path, f"holds no {KIND}")
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from dqslam import _core
 from dqslam._checks import Bools, Floats, require
 from dqslam.estimate import Estimate
+from dqslam.io.camera.table import write_json_camera
 from dqslam.io.files import write_json
 from dqslam.io.results.boxes import write_boxes
 from dqslam.io.results.covariances import write_covariances
@@ -78,7 +79,7 @@ def save_estimate(
     for name, poses in paths.items():
         cameras = _core.world_from_camera(estimate.pose_model, estimate.camera, poses)
         write_trajectory(directory / name, estimate.timestamps, cameras)
-    write_json(directory / "camera.json", _camera(estimate.camera))
+    write_json_camera(directory / "camera.json", estimate.camera)
     objects = [_object(estimate, row, marginals) for row in range(len(estimate.object_ids))]
     dropped = [{"id": number, "reason": reason} for number, reason in estimate.dropped.items()]
     write_json(directory / "map.json", {"objects": objects, "dropped": dropped})
@@ -90,12 +91,6 @@ def save_estimate(
         write_covariances(directory / "covariance.csv", estimate, marginals.poses)
     else:
         (directory / "covariance.csv").unlink(missing_ok=True)
-
-
-def _camera(camera: _core.Camera) -> dict[str, Any]:
-    names = ("fx", "fy", "cx", "cy", "width", "height")
-    lens = zip(("k1", "k2", "p1", "p2", "k3"), camera.distortion.tolist(), strict=True)
-    return {name: getattr(camera, name) for name in names} | dict(lens)
 
 
 def _object(estimate: Estimate, row: int, marginals: Covariances | None) -> dict[str, Any]:

@@ -1,0 +1,102 @@
+"""Positions of objects, absolute positions and loop closures, once the objects are found."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from dqslam import _core
+from dqslam.absolute import solve_with_absolute_positions
+from dqslam.association import FINAL
+from dqslam.graph import build_graph, solve
+from dqslam.pipeline.conclude import EstimatorOutput
+from dqslam.pipeline.lens import detections_with_exact_boxes
+from dqslam.pipeline.options import RunOptions
+from dqslam.recording import Recording
+from dqslam.uncertainty import marginal_covariances
+
+
+def usable_measurements(
+    recording: Recording, options: RunOptions
+) -> tuple[Recording, tuple[str, ...]]:
+    """Return the recording with the measurements that can take part, and why others cannot."""
+    if not _has_any(recording):
+        return recording, ()
+    if options.mode == _core.Mode.MAPPING:
+        why = "measurements took no part: mode MAPPING takes the poses for known"
+        return replace(recording, positions=None, absolute=None, closures=None), (why,)
+    positions, ids = recording.positions, recording.detections.object_id
+    if positions is None:
+        return recording, ()
+    if options.trust_ids != FINAL:
+        why = "positions took no part: the ids of boxes must be final, or objects are not known"
+        return replace(recording, positions=None), (why,)
+    seen = np.isin(positions.object_id, ids)
+    if seen.all():
+        return recording, ()
+    name = positions.object_id[np.argmin(seen)]
+    why = f"{np.sum(~seen)} positions took no part: object {name} and the like have no box"
+    return replace(recording, positions=positions.select(seen)), (why,)
+
+
+def with_measurements(
+    output: EstimatorOutput, recording: Recording, options: RunOptions
+) -> EstimatorOutput:
+    """Return the estimate of all poses and mapped objects with the recording's measurements.
+
+    It starts at the estimate without them. With absolute positions it is in their frame.
+    """
+    if not _has_any(recording):
+        return output
+    if not len(output.estimate.object_ids):
+        message = "no object was found: positions and loop closures took no part"
+        return replace(output, remarks=(*output.remarks, message))
+    solver = options.solve_options()
+    solver.schedule = _core.Schedule.BATCH
+    estimate = output.estimate
+    shown = np.isin(output.object_id, estimate.object_ids[estimate.is_ellipsoid])
+    boxes = replace(recording.detections, object_id=output.object_id).select(shown)
+    boxes = detections_with_exact_boxes(
+        estimate.camera,
+        estimate.pose_model,
+        estimate.poses,
+        estimate.object_ids,
+        estimate.ellipsoids,
+        boxes,
+    )
+    positions, odometry = recording.positions, recording.odometry
+    if positions is not None:
+        positions = positions.select(np.isin(positions.object_id, boxes.object_id))
+    if output.odometry_noise is not None:
+        steps = output.odometry_noise.covariance(len(odometry.relative), odometry.pose_model)
+        odometry = replace(odometry, covariance=steps)
+    told = replace(
+        recording,
+        odometry=odometry,
+        detections=boxes,
+        positions=positions,
+        measurements=(),
+        absolute=None,
+    )
+    graph = build_graph(told, box_noise=output.box_noise, size_prior=output.size_prior)
+    rows = np.searchsorted(estimate.object_ids, graph.object_ids)
+    start = _core.State(estimate.poses, estimate.ellipsoids[rows])
+    found, summary = solve(graph, solver, start=start)
+    if recording.absolute is not None:
+        found, marginals, summary = solve_with_absolute_positions(
+            graph, recording.absolute, solver, start=found
+        )
+    else:
+        marginals = marginal_covariances(graph, found, solver)
+    in_map = replace(
+        found,
+        inliers=estimate.inliers,
+        dropped=dict(sorted({**estimate.dropped, **found.dropped}.items())),
+    )
+    return replace(output, estimate=in_map, marginals=marginals, summary=summary, calibration=())
+
+
+def _has_any(recording: Recording) -> bool:
+    given = (recording.positions, recording.absolute, recording.closures)
+    return any(one is not None and len(one) > 0 for one in given)
