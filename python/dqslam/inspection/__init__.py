@@ -7,15 +7,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from dqslam import _core
-from dqslam.inspection.checks import (
-    check_box_corners,
-    check_boxes,
-    check_distortion,
-    check_image_size,
-    check_pose_direction,
-)
+from dqslam.inspection.box_checks import check_box_form, check_image_size
+from dqslam.inspection.checks import check_boxes, check_distortion
 from dqslam.inspection.evidence import Evidence, NotEnoughDataError
 from dqslam.inspection.evidence import Finding as Finding
+from dqslam.inspection.pose_checks import Verdict as Verdict
+from dqslam.inspection.pose_checks import check_explained, check_poses
 from dqslam.inspection.summary import summarize
 from dqslam.inspection.times import check_times
 from dqslam.inspection.tracks import Ids as Ids
@@ -26,10 +23,14 @@ Check = Callable[[Evidence], Finding | None]
 # names of the checks whose findings make it inconclusive.
 CHECKS: dict[str, tuple[Check, tuple[str, ...]]] = {
     "times": (check_times, ()),
-    "box corners": (check_box_corners, ()),
+    "box corners": (check_box_form, ()),
     "image size": (check_image_size, ("box corners",)),
-    "pose direction": (check_pose_direction, ("times", "box corners")),
-    "distortion": (check_distortion, ("times", "box corners", "image size", "pose direction")),
+    "poses": (check_poses, ("times", "box corners", "image size")),
+    "unexplained": (check_explained, ("times", "box corners", "image size", "poses")),
+    "distortion": (
+        check_distortion,
+        ("times", "box corners", "image size", "poses", "unexplained"),
+    ),
     "boxes": (check_boxes, ("box corners", "image size")),
 }
 

@@ -8,9 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dqslam import _core
+from dqslam.inspection.comparison import FEWEST_WINDOWS, WindowViews
 from dqslam.inspection.rays import Views, residuals
-from dqslam.inspection.tracks import FEWEST_VIEWS, Ids, find_tracks
+from dqslam.inspection.tracks import FEWEST_VIEWS, Ids, find_tracks, thinned
+from dqslam.inspection.windows import find_windows
 from dqslam.io import DetectionTable, Trajectory, nearest_pose
+from dqslam.recording.interpolation import interpolate_poses
 
 Floats = NDArray[np.float64]
 
@@ -71,11 +74,28 @@ class Evidence:
         """Return the poses and the middles of the boxes of each track."""
         boxes = self.table.box if boxes is None else boxes
         middle = (boxes[:, :2] + boxes[:, 2:]) / 2
+        tracks = [thinned(group) for group in tracks]
         longest = max(map(len, tracks))
         rows = np.array([np.pad(group, (0, longest - len(group)), "edge") for group in tracks])
         there = np.array([np.arange(longest) < len(group) for group in tracks])
         poses = self.trajectory.world_from_camera
         return Views(poses[self.pose[rows]], middle[rows], there)
+
+    def windows(
+        self, tracks: list[NDArray[np.int64]] | None = None, boxes: Floats | None = None
+    ) -> WindowViews:
+        """Return the views of windows, with the poses at the times of their boxes.
+
+        Boxes may be read otherwise, and tracks be those of other boxes.
+        """
+        boxes = self.table.box if boxes is None else boxes
+        tracks = self.tracks() if tracks is None else tracks
+        middle = (boxes[:, :2] + boxes[:, 2:]) / 2
+        windows = find_windows(tracks, middle, self.table.timestamp)
+        if len(windows) < FEWEST_WINDOWS:
+            raise NotEnoughDataError("no object moves through the image and is seen often enough")
+        poses = interpolate_poses(*self.trajectory, self.table.timestamp[windows.rows])
+        return WindowViews(self.camera, windows, poses, middle[windows.rows])
 
 
 def median_residual(camera: _core.Camera, views: Views) -> float:

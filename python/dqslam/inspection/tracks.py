@@ -19,6 +19,8 @@ ALONE_SHARE = 0.95
 FEWEST_VIEWS, MOST_VIEWS = 5, 40
 FEWEST_TRACKS, MOST_TRACKS = 3, 150
 LEAST_SCORE = 0.3
+# The most frames that are looked at, in this number of parts.
+MOST_FRAMES, PARTS = 2000, 20
 
 
 def find_tracks(table: DetectionTable, ids: Ids | None) -> list[NDArray[np.int64]]:
@@ -26,9 +28,10 @@ def find_tracks(table: DetectionTable, ids: Ids | None) -> list[NDArray[np.int64
 
     Without ``ids``, boxes are joined by their overlap. If that finds almost nothing, because images
     are far apart, boxes of a class with one object are joined. Of two boxes of an object in a frame
-    the one with the better score counts. Long tracks are thinned evenly.
+    the one with the better score counts. Of long recordings, parts are looked at.
     """
     rows = np.flatnonzero(table.score >= min(LEAST_SCORE, float(np.median(table.score))))
+    rows = rows[_in_parts(table.frame[rows])]
     if ids is not None:
         column = table.class_id if ids == "class_id" else table.track_id
         return [] if column is None else _grouped(table, rows, column[rows])
@@ -97,10 +100,22 @@ def _grouped(
     rows, label = rows[keep], label[keep]
     groups = np.split(rows, np.flatnonzero(np.diff(label)) + 1)
     seen_often = sorted((group for group in groups if len(group) >= FEWEST_VIEWS), key=len)
-    return [_thinned(group) for group in seen_often[::-1][:MOST_TRACKS]]
+    return seen_often[::-1][:MOST_TRACKS]
 
 
-def _thinned(group: NDArray[np.int64]) -> NDArray[np.int64]:
+def _in_parts(frame: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Choose boxes (m,) of at most MOST_FRAMES frames: parts of successive ones, evenly spaced."""
+    frames = np.unique(frame)
+    if len(frames) <= MOST_FRAMES:
+        return np.ones(len(frame), dtype=np.bool_)
+    part = np.arange(len(frames)) * PARTS // len(frames)
+    start = np.searchsorted(part, np.arange(PARTS))
+    chosen = np.arange(len(frames)) - start[part] < MOST_FRAMES // PARTS
+    return np.asarray(chosen[np.searchsorted(frames, frame)])
+
+
+def thinned(group: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return at most MOST_VIEWS rows of a track (n,), evenly spaced."""
     if len(group) <= MOST_VIEWS:
         return group
     kept: NDArray[np.int64] = group[np.linspace(0, len(group) - 1, MOST_VIEWS).round().astype(int)]
