@@ -13,6 +13,8 @@ Ids = Literal["track_id", "class_id"]
 
 # Boxes of one class that overlap by this much in successive frames show one object.
 LEAST_OVERLAP = 0.5
+# Boxes of one class that overlap by this much in one image show one object.
+SAME_OVERLAP = 0.7
 # A class with a single box in this share of its frames has one object.
 ALONE_SHARE = 0.95
 # The least number of boxes of a useful track, and the largest one that is used, to save time.
@@ -32,6 +34,7 @@ def find_tracks(table: DetectionTable, ids: Ids | None) -> list[NDArray[np.int64
     """
     rows = np.flatnonzero(table.score >= min(LEAST_SCORE, float(np.median(table.score))))
     rows = rows[_in_parts(table.frame[rows])]
+    rows = rows[~doubles(table, rows)]
     if ids is not None:
         column = table.class_id if ids == "class_id" else table.track_id
         return [] if column is None else _grouped(table, rows, column[rows])
@@ -73,6 +76,19 @@ def overlap(boxes: NDArray[np.float64], others: NDArray[np.float64]) -> NDArray[
     union = areas[0][:, None] + areas[1][None] - both
     shared: NDArray[np.float64] = both / np.where(union > 0, union, 1.0)
     return shared
+
+
+def doubles(table: DetectionTable, rows: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Tell which boxes (m,) show what a better box of their class in the same image shows."""
+    double = np.zeros(len(rows), dtype=np.bool_)
+    order = np.lexsort((-table.score[rows], table.class_id[rows], table.frame[rows]))
+    frame, number = table.frame[rows][order], table.class_id[rows][order]
+    starts = np.flatnonzero((np.diff(frame) != 0) | (np.diff(number) != 0)) + 1
+    for here in np.split(order, starts):
+        if len(here) > 1:
+            shared = overlap(table.box[rows[here]], table.box[rows[here]])
+            double[here] = np.any(np.tril(shared, -1) >= SAME_OVERLAP, axis=1)
+    return double
 
 
 def _lone_classes(table: DetectionTable, rows: NDArray[np.int64]) -> NDArray[np.int64]:

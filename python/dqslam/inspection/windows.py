@@ -43,8 +43,10 @@ class Windows:
         return len(self.rows)
 
 
-def find_windows(tracks: list[Ints], middle: Floats, time: Floats) -> Windows:
-    """Cut tracks into windows of each of LENGTHS.
+def find_windows(
+    tracks: list[Ints], middle: Floats, time: Floats, *, most: int = MOST_WINDOWS
+) -> Windows:
+    """Cut tracks into windows of each of LENGTHS, at most ``most`` of each.
 
     Parameters
     ----------
@@ -58,8 +60,8 @@ def find_windows(tracks: list[Ints], middle: Floats, time: Floats) -> Windows:
     length: list[int] = []
     for number, share in enumerate(LENGTHS):
         of_length = [part for track in tracks for part in _cut(track, middle, share * extent)]
-        if len(of_length) > MOST_WINDOWS:
-            chosen = np.linspace(0, len(of_length) - 1, MOST_WINDOWS).round().astype(int)
+        if len(of_length) > most:
+            chosen = np.linspace(0, len(of_length) - 1, most).round().astype(int)
             of_length = [of_length[i] for i in chosen]
         found += of_length
         length += [number] * len(of_length)
@@ -112,6 +114,7 @@ class Fit:
 
     miss: Floats  #: (w,) mean distance of middles from their point
     error: Floats  #: (w, n, 2) middles less their point, NaN for views that have it behind them
+    depth: Floats  #: (w, n) of the point, in the unit of positions; infinite for a direction
 
 
 def fit_points(turn: Floats, position: Floats, ray: Floats, there: NDArray[np.bool_]) -> Fit:
@@ -150,7 +153,9 @@ def fit_points(turn: Floats, position: Floats, ray: Floats, there: NDArray[np.bo
         usual = np.median(np.where(there, miss, miss[:, :1]), axis=1)[:, None]
         weight = there / (1 + (miss / (3 * usual + 1e-12)) ** 2) / np.maximum(depth, 1e-3) ** 2
         weight /= weight.max(axis=1, keepdims=True)
-    return Fit((miss * there).sum(axis=1) / count, error)
+    with np.errstate(divide="ignore"):
+        far = size[:, None] * depth / point[:, 3:]
+    return Fit((miss * there).sum(axis=1) / count, error, far)
 
 
 def _nearest(rows: Floats, weight: Floats, turn: Floats, local: Floats) -> Floats:
