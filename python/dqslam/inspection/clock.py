@@ -19,7 +19,7 @@ from dqslam.recording.interpolation import interpolate_poses
 STEPS = 12
 # An offset is sure if boxes miss less by this number of standard deviations, and if it is so many
 # of its own from zero. Smaller motions within it are no mistake [px].
-SURE_GAIN, SURE_OFFSET, LEAST_MOTION_PX = 2.0, 3.5, 2.5
+SURE, LEAST_MOTION_PX = ((2.0, 3.5), (1.2, 5.0)), 2.5
 # Beyond this share of the range, a path that repeats itself may fit as well.
 WITHIN = 0.75
 FEWEST_PARTS = 8
@@ -49,10 +49,9 @@ class ClockOffset:
     @property
     def sure(self) -> bool:
         """Whether boxes do fit better, and by more than what noise does."""
-        return (
-            self.gain_sigmas >= SURE_GAIN
-            and abs(self.seconds) >= SURE_OFFSET * self.sigma
-            and self.motion_px >= LEAST_MOTION_PX
+        far = abs(self.seconds) / self.sigma
+        return self.motion_px >= LEAST_MOTION_PX and any(
+            self.gain_sigmas >= gain and far >= offset for gain, offset in SURE
         )
 
     @property

@@ -29,8 +29,8 @@ def check_times(evidence: Evidence) -> Finding | None:
             if _common(poses * seconds, boxes) >= TOGETHER:
                 return Finding(
                     "times",
-                    f"times of the poses look like {unit}: {span}; --time-scale {1 / seconds:g} for "
-                    "the boxes, or change them in the file",
+                    f"times of the poses look like {unit}: {span}; change them in the file, or "
+                    f"read those of the boxes with --time-scale {1 / seconds:g}",
                 )
     late = int(np.sum(~evidence.timely))
     if evidence.timely.any():

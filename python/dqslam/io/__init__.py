@@ -17,6 +17,8 @@ from dqslam.io.frames import read_frame_times as read_frame_times
 from dqslam.io.images import find_images as find_images
 from dqslam.io.mount import read_mount as read_mount
 from dqslam.io.ply import write_ply as write_ply
+from dqslam.io.readings import BoxReading as BoxReading
+from dqslam.io.readings import Readings as Readings
 from dqslam.io.recording import Dropped as Dropped
 from dqslam.io.recording import load_recording as load_recording
 from dqslam.io.recording import nearest_pose as nearest_pose

@@ -131,3 +131,58 @@ def from_image(
         bars = (np.array(image) - np.array(size) / scale) / 2
     moved = (box - start - np.tile(bars, 2)) * np.tile(scale, 2) - 0.5
     return np.asarray(moved)
+
+
+@dataclass(frozen=True)
+class Readings:
+    """What the numbers in the files of a recording mean, where it is not what is usual."""
+
+    poses: tuple[str, ...] = ()
+    """Some of POSE_READINGS."""
+    body_from_camera: tuple[float, ...] | None = None
+    """Pose of the camera in the body whose poses the trajectory has: m and x y z w."""
+    length_scale: float = 1.0
+    """Meters in the unit of length of the poses: 0.001 for millimeters."""
+    boxes: BoxReading = BoxReading()
+    time_scale: float = 1.0
+    """Seconds in the unit of the times of boxes, by the clock of the poses."""
+    time_offset: float = 0.0
+    """Seconds to add to the times of boxes then."""
+
+    def __post_init__(self) -> None:
+        """Check what was chosen."""
+        for name in ("length_scale", "time_scale"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value > 0):
+                raise ValueError(f"{name} is {value:g}, not positive")
+        if not np.isfinite(self.time_offset):
+            raise ValueError(f"time_offset is {self.time_offset:g}, not finite")
+
+    def trajectory(self, trajectory: Trajectory) -> Trajectory:
+        """Return the trajectory of the camera in meters."""
+        times, poses = read_poses_as(trajectory, self.poses) if self.poses else trajectory
+        if self.length_scale != 1.0:
+            poses = poses * np.array([self.length_scale] * 3 + [1.0] * 4)
+        if self.body_from_camera is not None:
+            mount = np.tile(np.array(self.body_from_camera, dtype=float), (len(times), 1))
+            poses = _core.compose(_core.PoseModel.SE3, poses, mount)
+        return Trajectory(times, poses)
+
+    @property
+    def changes_boxes(self) -> bool:
+        """Whether boxes are read otherwise than their format says."""
+        return self.boxes != BoxReading()
+
+    def detections(self, table: DetectionTable, size: tuple[int, int]) -> DetectionTable:
+        """Return unchecked, uncut boxes as corners in an image of this size, at their times."""
+        return self.timed(self.boxes.read(table, size))
+
+    def timed(self, table: DetectionTable) -> DetectionTable:
+        """Return boxes at their times by the clock of the poses."""
+        if self.time_scale == 1.0 and self.time_offset == 0.0:
+            return table
+        return replace(table, timestamp=self.time_scale * table.timestamp + self.time_offset)
+
+
+#: Files mean what is usual.
+AS_USUAL = Readings()

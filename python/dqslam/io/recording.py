@@ -13,15 +13,23 @@ from dqslam import _core
 from dqslam.assumptions import OdometryNoise
 from dqslam.io.camera import read_camera
 from dqslam.io.detections import DetectionTable, read_detections
+from dqslam.io.detections.table import checked
 from dqslam.io.files import FileError
 from dqslam.io.frames import FrameTimes
+from dqslam.io.readings import AS_USUAL, Readings
 from dqslam.io.sources import FormatNames
 from dqslam.io.step_covariances import read_step_covariances
 from dqslam.io.trajectory import read_trajectory
 from dqslam.recording import Detections, Odometry, Recording
+from dqslam.recording.interpolation import split_steps
 
 # With two boxes and a noisy path, the distance of an object cannot be separated from its size.
 FEWEST_BOXES = 3
+
+# An image this much of an interval from a pose has its own pose, except in longer intervals than so
+# many usual ones.
+NEAR_SHARE, LONGEST_INTERVAL = 0.05, 2.5
+ROUNDING = 1e-6
 
 Ids = Literal["none", "track_id", "class_id"]
 
@@ -56,6 +64,8 @@ def load_recording(
     odometry_covariance: str | Path | None = None,
     formats: FormatNames | None = None,
     frames: FrameTimes | None = None,
+    readings: Readings = AS_USUAL,
+    interpolate: bool = True,
 ) -> tuple[Recording, Dropped]:
     """Read a recording in SE(3), where the robot is the camera, and the numbers of dropped boxes.
 
@@ -74,8 +84,8 @@ def load_recording(
         the worse one of two boxes with the same id in an image, and those whose id has fewer than 3
         boxes.
     max_time_difference
-        A box belongs to the nearest pose in time, if that is within this number of seconds. The
-        default is half the median interval between poses.
+        The most seconds from a box to the nearest pose in time; by default half the median interval
+        between poses.
     odometry_noise
         The uncertainty of each step, because trajectory files have none.
     odometry_covariance
@@ -85,6 +95,11 @@ def load_recording(
         Names of the formats, for files that cannot be recognized.
     frames
         Times of the frames, for files that only number them: see ``choose_frame_times``.
+    readings
+        What numbers in the files mean, where it is not what is usual.
+    interpolate
+        Whether images between two poses get poses of their own, at constant velocity. If not, a
+        box belongs to the nearest pose.
 
     Raises
     ------
@@ -114,31 +129,33 @@ def load_recording(
         raise ValueError(f"max_time_difference is {max_time_difference:g}, negative")
     names = formats or FormatNames()
     lens = read_camera(camera, names.camera)
-    times, path = read_trajectory(odometry, names.trajectory, frames=frames)
+    times, path = readings.trajectory(read_trajectory(odometry, names.trajectory, frames=frames))
     if len(times) < 2:
         raise FileError(odometry, "one pose only: nothing moves")
-    table = read_detections(
-        detections, names.detections, width=lens.width, height=lens.height, frames=frames
-    )
+    table = _read_boxes(detections, names.detections, lens, frames, readings)
     object_id = _object_ids(table, ids)
-    pose, late = nearest_pose(times, table.timestamp)
-    tolerance = 0.5 * float(np.median(np.diff(times)))
-    if max_time_difference is not None:
-        tolerance = max_time_difference
-    final = final_ids and ids != "none"
-    rows, dropped = (_select if final else _select_images)(
-        table, object_id, pose, late, min_score, tolerance
-    )
-    if not rows.size:
-        raise FileError(detections, _nothing_left(table, dropped, ids, tolerance, times))
     covariance = (odometry_noise or OdometryNoise()).covariance(len(path) - 1)
     if odometry_covariance is not None:
         covariance = read_step_covariances(odometry_covariance, times)
+    steps = Odometry.from_poses(path, covariance=covariance)
+    _, late = nearest_pose(times, table.timestamp)
+    tolerance = 0.5 * float(np.median(np.diff(times))) * (1 + ROUNDING)
+    if max_time_difference is not None:
+        tolerance = max_time_difference
+    if interpolate:
+        steps, times = split_steps(steps, times, _between_poses(table.timestamp, late, times))
+    pose, apart = nearest_pose(times, table.timestamp)
+    final = final_ids and ids != "none"
+    rows, dropped = (_select if final else _select_images)(
+        table, object_id, pose, np.where(late <= tolerance, apart, np.inf), min_score, tolerance
+    )
+    if not rows.size:
+        raise FileError(detections, _nothing_left(table, dropped, ids, tolerance, times))
     classes = dict(zip(table.class_id.tolist(), table.class_name, strict=True))
     recording = Recording(
         camera=lens,
         timestamps=times,
-        odometry=Odometry.from_poses(path, covariance=covariance),
+        odometry=steps,
         detections=Detections(
             pose=pose[rows],
             box=_undistorted(lens, camera, table, rows),
@@ -150,6 +167,32 @@ def load_recording(
         positions=None,
     )
     return recording, dropped
+
+
+def _read_boxes(
+    path: str | Path,
+    format_: str | None,
+    lens: _core.Camera,
+    frames: FrameTimes | None,
+    readings: Readings,
+) -> DetectionTable:
+    """Read boxes, checked and cut to the image after they are read as they are meant."""
+    size = {"width": lens.width, "height": lens.height}
+    if not readings.changes_boxes:
+        return readings.timed(read_detections(path, format_, frames=frames, **size))
+    raw = read_detections(path, format_, frames=frames, cut=False, check=False, **size)
+    return checked(readings.detections(raw, (lens.width, lens.height)), cut=True, **size)
+
+
+def _between_poses(
+    times: NDArray[np.float64], late: NDArray[np.float64], pose_times: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the times (k,) of boxes, of all (m,), that are too far from the nearest pose."""
+    before = np.clip(np.searchsorted(pose_times, times) - 1, 0, len(pose_times) - 2)
+    interval = pose_times[before + 1] - pose_times[before]
+    # In a gap of the odometry, its velocity is not known.
+    usual = interval <= LONGEST_INTERVAL * float(np.median(np.diff(pose_times)))
+    return np.unique(times[usual & (late > NEAR_SHARE * interval)])
 
 
 def nearest_pose(

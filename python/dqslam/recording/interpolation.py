@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from dqslam import _core
+from dqslam.recording.odometry import Odometry
 
 Floats = NDArray[np.float64]
 
@@ -39,6 +42,54 @@ def interpolate_poses(times: Floats, poses: Floats, at: Floats) -> Floats:
     exact = (share == 0.0) | (share == 1.0)
     found[exact] = poses[before + (share == 1.0)][exact]
     return found.reshape(*np.shape(at), poses.shape[1])
+
+
+def split_steps(odometry: Odometry, times: Floats, at: Floats) -> tuple[Odometry, Floats]:
+    """Add poses between those of odometry, and split the steps between them.
+
+    The parts of a step are as uncertain together as the step: each has its share of the covariance,
+    by time, as seen from where it ends.
+
+    Parameters
+    ----------
+    odometry
+        Of n poses.
+    times
+        Their times (n,), increasing, s.
+    at
+        Times (k,) of the poses to add, s. Those outside of the poses, and those of poses, are not.
+
+    Returns
+    -------
+    tuple[Odometry, Floats]
+        Odometry of more poses, and their times.
+    """
+    model = odometry.pose_model
+    inside = (at > times[0]) & (at < times[-1])
+    new = np.setdiff1d(at[inside], times)
+    if not new.size:
+        return odometry, times
+    path = _core.dead_reckon(model, odometry.first_pose, odometry.relative)
+    together = np.union1d(times, new)
+    poses = interpolate_poses(times, path, together)
+    poses[np.searchsorted(together, times)] = path
+    step = np.searchsorted(times, together[1:], side="left") - 1
+    share = np.diff(together) / (times[step + 1] - times[step])
+    # The error of a part is one of the end of its step, as seen from there.
+    part_from_end = _core.between(model, poses[1:], path[step + 1])
+    back = _core.adjoint(model, part_from_end)
+    covariance = back @ odometry.covariance[step] @ np.swapaxes(back, 1, 2)
+    covariance *= share[:, None, None]
+    whole = share == 1.0
+    covariance[whole] = odometry.covariance[step[whole]]
+    relative = _core.between(model, poses[:-1], poses[1:])
+    relative[whole] = odometry.relative[step[whole]]
+    split = replace(
+        odometry,
+        relative=relative,
+        covariance=(covariance + np.swapaxes(covariance, 1, 2)) / 2,
+    )
+    return split, together
 
 
 def advance(start: Floats, end: Floats, share: Floats) -> Floats:
