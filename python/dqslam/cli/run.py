@@ -8,15 +8,24 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from dqslam.cli.options import (
+    BoxForm,
+    BoxImage,
     CameraFile,
+    CameraInBody,
     DetectionFile,
     Formats,
     FrameRate,
     FrameTimesFile,
+    LengthScale,
+    Letterbox,
     MaxTimeDifference,
     OdometryFile,
+    PosesAs,
     ResultDirectory,
+    TimeOffset,
+    TimeScale,
     given_frame_times,
+    given_readings,
 )
 from dqslam.cli.output import Json, Output, Quiet
 from dqslam.cli.run_tables import show_report
@@ -25,6 +34,7 @@ from dqslam.cli.settings import CONFIG, ConfigFile, settings_text
 if TYPE_CHECKING:
     from dqslam.assumptions import OdometryNoise
 
+DOUBTFUL = 3  # exit code of a run whose result is doubtful
 NOISE = "translation=0.02,rotation=0.01"
 
 
@@ -105,6 +115,18 @@ def run(
         typer.Option("--online", help="Replay the recording step by step, and polish at the end."),
     ] = False,
     max_time_difference: MaxTimeDifference = None,
+    poses: PosesAs = None,
+    camera_in_body: CameraInBody = None,
+    length_scale: LengthScale = 1.0,
+    box_form: BoxForm = None,
+    box_image: BoxImage = None,
+    letterbox: Letterbox = False,
+    time_offset: TimeOffset = 0.0,
+    time_scale: TimeScale = 1.0,
+    force: Annotated[
+        bool,
+        typer.Option("--force", help="Go on if poses and boxes do not fit together."),
+    ] = False,
     config: ConfigFile = None,
     quiet: Quiet = False,
     json: Json = False,
@@ -112,7 +134,8 @@ def run(
     """Estimate the trajectory and the objects of a recording.
 
     Writes trajectory.txt, odometry.txt (the initial poses), map.json, boxes.csv, camera.json,
-    report.json and config.toml.
+    report.json and config.toml. Exits with 3 if the result is doubtful: poses and boxes do not fit
+    together, the map is empty, or most boxes show nothing in it.
     """
     from dqslam import _core, io
     from dqslam.assumptions import load_size_priors
@@ -135,6 +158,17 @@ def run(
         formats=io.split_formats(formats or []),
         frames=given_frame_times(frame_times, frame_rate),
         max_time_difference=max_time_difference,
+        readings=given_readings(
+            poses=poses,
+            camera_in_body=camera_in_body,
+            length_scale=length_scale,
+            box_form=box_form,
+            box_image=box_image,
+            letterbox=letterbox,
+            time_offset=time_offset,
+            time_scale=time_scale,
+        ),
+        force=force,
         added_noise=added,
         odometry_noise=believed,
         odometry_covariance=odometry_covariance,
@@ -159,6 +193,8 @@ def run(
     output.document(result.report)
     show_report(output, result.report)
     output.line(f"wrote {out}")
+    if result.report["doubts"]:
+        raise typer.Exit(DOUBTFUL)
 
 
 def parse_noise(option: str, text: str | None) -> "OdometryNoise | None":

@@ -11,12 +11,13 @@ from dqslam import _core
 from dqslam.inspection.box_checks import check_box_form, check_image_size
 from dqslam.inspection.checks import check_boxes, check_distortion
 from dqslam.inspection.clock import ClockOffset as ClockOffset
-from dqslam.inspection.clock import check_clock, estimate_clock_offset
+from dqslam.inspection.clock import check_clock, check_clock_shortly, estimate_clock_offset
 from dqslam.inspection.evidence import Evidence, NotEnoughDataError
 from dqslam.inspection.evidence import Finding as Finding
 from dqslam.inspection.odometry import check_doubles, check_units, note_jumps
 from dqslam.inspection.pose_checks import Verdict as Verdict
 from dqslam.inspection.pose_checks import check_explained, check_poses, judge
+from dqslam.inspection.pose_checks import pixels as pixels
 from dqslam.inspection.summary import summarize
 from dqslam.inspection.times import check_times
 from dqslam.inspection.tracks import Ids as Ids
@@ -38,6 +39,15 @@ CHECKS: dict[str, tuple[Check, tuple[str, ...]]] = {
     "boxes": (check_boxes, ("box corners", "image size")),
     "doubles": (check_doubles, ()),
 }
+
+
+# What `dqslam run` checks first: what takes long, or what reading the boxes refuses, is left out.
+FIRST_CHECKS = {
+    name: CHECKS[name]
+    for name in ("times", "image size", "poses", "clock", "unexplained", "units", "doubles")
+} | {"clock": (check_clock_shortly, CHECKS["clock"][1])}
+#: Findings with which files make no map.
+FATAL = ("times", "image size", "poses", "unexplained")
 
 
 @dataclass(frozen=True)
@@ -91,6 +101,23 @@ def inspect_recording(
         clock,
         tuple(note_jumps(evidence)),
     )
+
+
+def first_findings(
+    camera: _core.Camera,
+    trajectory: Trajectory,
+    table: DetectionTable,
+    *,
+    ids: Ids | None = None,
+    max_time_difference: float | None = None,
+) -> tuple[tuple[Finding, ...], tuple[str, ...]]:
+    """Return the mistakes that a short check finds before a run, and notes.
+
+    Parameters are those of ``inspect_recording``.
+    """
+    evidence = Evidence.of(camera, trajectory, table, ids, max_time_difference)
+    findings, _ = run_checks(evidence, FIRST_CHECKS)
+    return tuple(findings.values()), tuple(note_jumps(evidence))
 
 
 def run_checks(

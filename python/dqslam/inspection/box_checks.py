@@ -184,7 +184,7 @@ def _fitting_images(evidence: Evidence, beyond: float) -> list[_Image]:
         views: WindowViews | None = _longer(evidence.windows())
     except NotEnoughDataError:
         views = None
-    given = None if views is None else views.explanation()
+    given = None if views is None else views.given
     noise = (
         given is None
         or views is None
@@ -215,7 +215,25 @@ def _fitting_images(evidence: Evidence, beyond: float) -> list[_Image]:
         ]
         if given is not None:
             better = [one for one in better if one.explanation and alike(given, one.explanation)]
-    return sorted(better, key=_badness)
+    return _simplest(sorted(better, key=_badness), camera)
+
+
+def _simplest(images: list[_Image], camera: _core.Camera) -> list[_Image]:
+    """Leave out stretched images if one with the proportions of the camera's fits as well."""
+    proportions = camera.width / camera.height
+    plain = [
+        one
+        for one in images
+        if one.reading.letterbox
+        or (
+            one.reading.image
+            and abs(np.log(one.reading.image[0] / one.reading.image[1] / proportions)) < 0.02
+        )
+    ]
+    if not plain:
+        return images
+    best, first = images[0].explanation, plain[0].explanation
+    return images if best is None or first is None or not alike(best, first) else plain
 
 
 def _explains_better(given: Explanation | None, image: _Image) -> bool:

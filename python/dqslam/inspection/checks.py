@@ -25,7 +25,7 @@ LENS_SHARE, LENS_TRACKS = 0.85, 5
 # right lens, 0.86 for a wrong one.
 BARE_SHARE = 0.92
 # If rays miss each other by more than this, there is another reason [px].
-LARGEST_LENS_PX = 20.0
+LARGEST_LENS_PX = 50.0
 RADIAL = tuple(
     itertools.product(
         (-0.4, -0.3, -0.2, -0.1, -0.05, 0.0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3),

@@ -16,13 +16,14 @@ from dqslam.inspection.windows import FEWEST_STEPS, MOST_WINDOWS, Windows, find_
 from dqslam.recording.interpolation import interpolate_poses
 
 # Offsets that are tried: steps to each side.
-STEPS = 12
+STEPS, FEW_STEPS = 12, 4
 # An offset is sure if boxes miss less by this number of standard deviations, and if it is so many
 # of its own from zero. Smaller motions within it are no mistake [px].
-SURE, LEAST_MOTION_PX = ((2.0, 3.5), (1.2, 5.0)), 2.5
+SURE_GAIN, SURE_OFFSET, LEAST_MOTION_PX = 2.0, 3.5, 2.5
 # Beyond this share of the range, a path that repeats itself may fit as well.
 WITHIN = 0.75
 FEWEST_PARTS = 8
+RESAMPLES = 200
 SURE_DRIFT = 5.0
 # The least steps of the camera that are compared.
 FEWEST_COMPARED = 60
@@ -49,9 +50,10 @@ class ClockOffset:
     @property
     def sure(self) -> bool:
         """Whether boxes do fit better, and by more than what noise does."""
-        far = abs(self.seconds) / self.sigma
-        return self.motion_px >= LEAST_MOTION_PX and any(
-            self.gain_sigmas >= gain and far >= offset for gain, offset in SURE
+        return (
+            self.gain_sigmas >= SURE_GAIN
+            and abs(self.seconds) >= SURE_OFFSET * self.sigma
+            and self.motion_px >= LEAST_MOTION_PX
         )
 
     @property
@@ -60,32 +62,35 @@ class ClockOffset:
         return abs(self.drift) >= SURE_DRIFT * self.drift_sigma
 
 
-def estimate_clock_offset(evidence: Evidence, views: WindowViews | None = None) -> ClockOffset:
+def estimate_clock_offset(
+    evidence: Evidence, *, steps: int = STEPS, most: int = MOST_CLOCK_WINDOWS
+) -> ClockOffset:
     """Find the offset of the clocks at which boxes move most like the poses say.
+
+    It is looked for within a number of steps, intervals of poses or half those of images, in at
+    most so many windows of a length.
 
     Raises
     ------
     NotEnoughDataError
         If too few boxes move from view to view.
     """
-    views = _views(evidence) if views is None else views
+    views = _views(evidence, most)
     step = _step(evidence)
-    offsets = step * np.arange(-STEPS, STEPS + 1)
+    offsets = step * np.arange(-steps, steps + 1, dtype=float)
     costs, when = _costs(evidence, views, offsets)
     total = costs.sum(axis=0)
     best, inside = _least(total)
-    # Each part of the time is left out once: the spread of what is found then.
-    left_out = np.array([_least(total - one)[0] for one in costs])
-    count = len(left_out)
-    spread = float(np.sqrt((count - 1) / count * np.sum((left_out - left_out.mean()) ** 2)))
-    gains = costs[:, STEPS] - costs[:, int(np.clip(round(best), 0, 2 * STEPS))]
+    spread = _spread(costs)
+    count = len(costs)
+    gains = costs[:, steps] - costs[:, int(np.clip(round(best), 0, 2 * steps))]
     noise = float(gains.std(ddof=1)) / np.sqrt(count)
-    seconds = step * (best - STEPS)
+    seconds = step * (best - steps)
     drift, drift_sigma = _drift(costs, when)
     return ClockOffset(
         seconds=seconds,
         sigma=step * max(spread, 0.05)
-        if inside and abs(best - STEPS) <= WITHIN * STEPS
+        if inside and abs(best - steps) <= WITHIN * steps
         else np.inf,
         gain_sigmas=float(gains.mean()) / max(noise, 1e-12),
         motion_px=abs(seconds) * _speed(evidence, views),
@@ -94,9 +99,17 @@ def estimate_clock_offset(evidence: Evidence, views: WindowViews | None = None) 
     )
 
 
+def check_clock_shortly(evidence: Evidence) -> Finding | None:
+    """Check whether boxes fit better at times nearby, with few windows."""
+    return _judge(evidence, estimate_clock_offset(evidence, steps=FEW_STEPS, most=MOST_WINDOWS))
+
+
 def check_clock(evidence: Evidence) -> Finding | None:
     """Check whether boxes fit better at other times: an offset, or another rate of the clock."""
-    clock = estimate_clock_offset(evidence)
+    return _judge(evidence, estimate_clock_offset(evidence))
+
+
+def _judge(evidence: Evidence, clock: ClockOffset) -> Finding | None:
     if clock.drifts:
         scale = 1 + clock.drift
         return Finding(
@@ -115,10 +128,10 @@ def check_clock(evidence: Evidence) -> Finding | None:
     )
 
 
-def _views(evidence: Evidence) -> WindowViews:
+def _views(evidence: Evidence, most: int) -> WindowViews:
     middle = (evidence.table.box[:, :2] + evidence.table.box[:, 2:]) / 2
     time = evidence.table.timestamp
-    windows = find_windows(evidence.tracks(), middle, time, most=MOST_CLOCK_WINDOWS)
+    windows = find_windows(evidence.tracks(), middle, time, most=most)
     moving = windows.length < 2
     windows = Windows(
         windows.rows[moving], windows.there[moving], windows.length[moving], windows.part[moving]
@@ -191,14 +204,20 @@ def _drift(costs: Floats, when: Floats) -> tuple[float, float]:
     found, spreads = [], []
     for rows in thirds:
         best, inside = _least(costs[rows].sum(axis=0))
-        without = [_least(costs[np.setdiff1d(rows, [row])].sum(axis=0))[0] for row in rows]
-        spread = float(np.std(without)) * np.sqrt(len(rows) - 1) if len(rows) > 1 else np.inf
+        spread = _spread(costs[rows])
         found.append(best)
         spreads.append(max(spread, 0.1) if inside else np.inf)
     time = float(when[thirds[2]].mean() - when[thirds[0]].mean())
     between = min(found[0], found[2]) - 1 <= found[1] <= max(found[0], found[2]) + 1
     sigma = float(np.hypot(spreads[0], spreads[2])) if between else np.inf
     return (found[2] - found[0]) / time, sigma / time
+
+
+def _spread(costs: Floats) -> float:
+    """Return the standard deviation of the least, if other parts of the time had been seen."""
+    random = np.random.default_rng(0)
+    drawn = random.multinomial(len(costs), np.full(len(costs), 1 / len(costs)), RESAMPLES)
+    return float(np.std([_least(total)[0] for total in drawn @ costs]))
 
 
 def _least(costs: Floats) -> tuple[float, bool]:

@@ -89,9 +89,14 @@ class WindowViews:
         position = self.poses[..., :3] @ np.reshape(reading.positions, (3, 3)).T
         if reading.inverted:
             turn = np.swapaxes(turn, -1, -2)
-            position = -np.einsum("wnij,wnj->wni", turn, position)
+            position = -(turn @ position[..., None])[..., 0]
         turn = turn @ np.reshape(reading.axes, (3, 3))
         return fit_points(turn, position, self.rays, self.windows.there)
+
+    @cached_property
+    def given(self) -> Explanation:
+        """How much the poses explain as they are."""
+        return self.explanation()
 
     def explanation(self, reading: PoseReading = GIVEN) -> Explanation:
         """Say how much of the motion of the boxes the poses explain, read so."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,10 @@ class Finding:
 
     check: str
     message: str
+
+    def __str__(self) -> str:
+        """Say it in a sentence."""
+        return f"{self.check}: {self.message}"
 
 
 class NotEnoughDataError(Exception):
@@ -61,9 +66,19 @@ class Evidence:
             tolerance = max_time_difference
         return cls(camera, trajectory, table, pose, late <= tolerance, tolerance, ids)
 
+    @cached_property
+    def _tracks(self) -> list[NDArray[np.int64]]:
+        return self._find_tracks(self.table)
+
+    @cached_property
+    def _windows(self) -> WindowViews:
+        return self._find_windows(self.tracks(), self.table.box)
+
     def tracks(self, boxes: Floats | None = None) -> list[NDArray[np.int64]]:
         """Return the rows of tracks with poses, for the given boxes or other corners of them."""
-        table = self.table if boxes is None else replace(self.table, box=boxes)
+        return self._tracks if boxes is None else self._find_tracks(replace(self.table, box=boxes))
+
+    def _find_tracks(self, table: DetectionTable) -> list[NDArray[np.int64]]:
         timely = (group[self.timely[group]] for group in find_tracks(table, self.ids))
         tracks = [group for group in timely if len(group) >= FEWEST_VIEWS]
         if not tracks:
@@ -88,8 +103,12 @@ class Evidence:
 
         Boxes may be read otherwise, and tracks be those of other boxes.
         """
+        if tracks is None and boxes is None:
+            return self._windows
         boxes = self.table.box if boxes is None else boxes
-        tracks = self.tracks() if tracks is None else tracks
+        return self._find_windows(self.tracks() if tracks is None else tracks, boxes)
+
+    def _find_windows(self, tracks: list[NDArray[np.int64]], boxes: Floats) -> WindowViews:
         middle = (boxes[:, :2] + boxes[:, 2:]) / 2
         windows = find_windows(tracks, middle, self.table.timestamp)
         if len(windows) < FEWEST_WINDOWS:

@@ -80,8 +80,8 @@ def judge(evidence: Evidence) -> Verdict:
         If no object is seen often enough while it moves through the image.
     """
     tracks = evidence.tracks()
-    views = evidence.windows(tracks)
-    given = views.explanation()
+    views = evidence.windows()
+    given = views.given
     short = views.windows.length == views.windows.length.min()
     try:
         whole: float | None = median_residual(evidence.camera, evidence.views(tracks))
@@ -102,7 +102,7 @@ def judge(evidence: Evidence) -> Verdict:
 def check_poses(evidence: Evidence) -> Finding | None:
     """Compare the poses as given with other readings of them, by the motion they explain."""
     views = evidence.windows()
-    given = views.explanation()
+    given = views.given
     if given.unexplained <= WELL and not given.persistence > NOISE:
         return None
     best = _best(views, given, usual_readings())

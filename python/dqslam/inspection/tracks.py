@@ -15,6 +15,7 @@ Ids = Literal["track_id", "class_id"]
 LEAST_OVERLAP = 0.5
 # Boxes of one class that overlap by this much in one image show one object.
 SAME_OVERLAP = 0.7
+MOST_ALIKE = 50  #: boxes of one class in an image that are compared with each other
 # A class with a single box in this share of its frames has one object.
 ALONE_SHARE = 0.95
 # The least number of boxes of a useful track, and the largest one that is used, to save time.
@@ -69,11 +70,15 @@ def overlap_ids(table: DetectionTable, rows: NDArray[np.int64]) -> NDArray[np.in
 
 def overlap(boxes: NDArray[np.float64], others: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return intersection over union of boxes (a, 4) with others (b, 4): shape (a, b)."""
-    low = np.maximum(boxes[:, None, :2], others[None, :, :2])
-    high = np.minimum(boxes[:, None, 2:], others[None, :, 2:])
-    both = np.prod(np.clip(high - low, 0, None), axis=2)
-    areas = [np.prod(box[:, 2:] - box[:, :2], axis=1) for box in (boxes, others)]
-    union = areas[0][:, None] + areas[1][None] - both
+    return _shared(boxes[:, None], others[None])
+
+
+def _shared(boxes: NDArray[np.float64], others: NDArray[np.float64]) -> NDArray[np.float64]:
+    low = np.maximum(boxes[..., :2], others[..., :2])
+    high = np.minimum(boxes[..., 2:], others[..., 2:])
+    both = np.prod(np.clip(high - low, 0, None), axis=-1)
+    areas = [np.prod(box[..., 2:] - box[..., :2], axis=-1) for box in (boxes, others)]
+    union = areas[0] + areas[1] - both
     shared: NDArray[np.float64] = both / np.where(union > 0, union, 1.0)
     return shared
 
@@ -82,12 +87,14 @@ def doubles(table: DetectionTable, rows: NDArray[np.int64]) -> NDArray[np.bool_]
     """Tell which boxes (m,) show what a better box of their class in the same image shows."""
     double = np.zeros(len(rows), dtype=np.bool_)
     order = np.lexsort((-table.score[rows], table.class_id[rows], table.frame[rows]))
-    frame, number = table.frame[rows][order], table.class_id[rows][order]
-    starts = np.flatnonzero((np.diff(frame) != 0) | (np.diff(number) != 0)) + 1
-    for here in np.split(order, starts):
-        if len(here) > 1:
-            shared = overlap(table.box[rows[here]], table.box[rows[here]])
-            double[here] = np.any(np.tril(shared, -1) >= SAME_OVERLAP, axis=1)
+    boxes, frame, number = (part[rows][order] for part in (table.box, table.frame, table.class_id))
+    for step in range(1, MOST_ALIKE):
+        same = (frame[step:] == frame[:-step]) & (number[step:] == number[:-step])
+        if not same.any():
+            break
+        later = np.flatnonzero(same) + step
+        shared = _shared(boxes[later], boxes[later - step])
+        double[order[later[shared >= SAME_OVERLAP]]] = True
     return double
 
 

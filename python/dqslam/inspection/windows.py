@@ -55,7 +55,7 @@ def find_windows(
     middle, time
         Middles (m, 2) and times (m,) of all boxes.
     """
-    extent = np.linalg.norm(np.diff(np.quantile(middle, [0.05, 0.95], axis=0), axis=0))
+    extent = float(np.linalg.norm(np.diff(np.quantile(middle, [0.05, 0.95], axis=0), axis=0)))
     found: list[Ints] = []
     length: list[int] = []
     for number, share in enumerate(LENGTHS):
@@ -81,7 +81,7 @@ def _cut(track: Ints, middle: Floats, extent: float) -> list[Ints]:
     """Cut a track where its middles have moved far enough; what is left over is dropped."""
     if not np.isfinite(extent):
         return [_thinned(track)] if len(track) >= FEWEST_VIEWS else []
-    parts = []
+    parts: list[Ints] = []
     place = middle[track]
     start = 0
     while start + FEWEST_VIEWS <= len(track):
@@ -138,15 +138,14 @@ def fit_points(turn: Floats, position: Floats, ray: Floats, there: NDArray[np.bo
     local = local / np.maximum(size, 1e-12)[:, None, None]
     # A point X = [x, w] has the camera coordinates R^T (x - w c): rows of u z - x = 0, v z - y = 0.
     across = np.swapaxes(turn[..., :2] - turn[..., 2:] * ray[..., None, :], -1, -2)
-    rows = np.concatenate([across, -np.einsum("wnki,wni->wnk", across, local)[..., None]], axis=-1)
+    rows = np.concatenate([across, -across @ local[..., None]], axis=-1)
     weight = there.astype(float)
     for _ in range(ITERATIONS):
         point = _nearest(rows, weight, turn, local)
-        offset = point[:, None, :3] - point[:, None, 3:] * local
-        depth = np.einsum("wni,wni->wn", turn[..., 2], offset)
+        depth = _depths(point, turn, local)
         ahead = depth > 1e-9
         # The rows at the point are x - u z and y - v z.
-        error = -np.einsum("wnki,wi->wnk", rows, point)
+        error = -(rows @ point[:, None, :, None])[..., 0]
         error = np.where(ahead[..., None], error / np.where(ahead, depth, 1.0)[..., None], np.nan)
         off = np.linalg.norm(error, axis=2)
         miss = np.where(ahead, np.minimum(off, BEHIND), BEHIND)
@@ -160,9 +159,11 @@ def fit_points(turn: Floats, position: Floats, ray: Floats, there: NDArray[np.bo
 
 def _nearest(rows: Floats, weight: Floats, turn: Floats, local: Floats) -> Floats:
     """Return the homogeneous points [x, w], w >= 0, with the least weighted error: (w, 4)."""
-    normal = np.einsum("wn,wnki,wnkj->wij", weight, rows, rows)
+    count, views = weight.shape
+    flat = rows.reshape(count, 2 * views, 4)
+    normal = np.swapaxes(flat, 1, 2) @ (flat * np.repeat(weight, 2, axis=1)[..., None])
     point = np.linalg.eigh(normal)[1][..., 0]
-    depth = np.einsum("wni,wni->wn", turn[..., 2], point[:, None, :3] - point[:, None, 3:] * local)
+    depth = _depths(point, turn, local)
     seen = weight > 0
     side = np.where(np.sum(np.sign(depth) * seen, axis=1) < 0, -1.0, 1.0)
     point = point * side[:, None]
@@ -176,6 +177,12 @@ def _nearest(rows: Floats, weight: Floats, turn: Floats, local: Floats) -> Float
     return point
 
 
+def _depths(point: Floats, turn: Floats, local: Floats) -> Floats:
+    """Return the homogeneous depths of points (w, 4) in views, (w, n)."""
+    offset = point[:, None, :3] - point[:, None, 3:] * local
+    return np.asarray(np.sum(turn[..., 2] * offset, axis=2))
+
+
 def persistence(change: Floats, windows: Windows) -> float:
     """Return how much steps (w, n - 1, 2) in windows resemble the step before: -1 to 1, 1 if equal.
 
@@ -183,7 +190,7 @@ def persistence(change: Floats, windows: Windows) -> float:
     are smooth; the noise of odometry is new in every step. NaN with fewer than FEWEST_STEPS. The
     larger value of windows of the two shorter lengths counts.
     """
-    known = np.isfinite(change).all(axis=2)
+    known = np.asarray(np.isfinite(change).all(axis=2))
     pairs = windows.there[:, 2:] & known[:, 1:] & known[:, :-1]
     before, after = change[:, :-1], change[:, 1:]
     values = []

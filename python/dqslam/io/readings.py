@@ -151,6 +151,9 @@ class Readings:
 
     def __post_init__(self) -> None:
         """Check what was chosen."""
+        unknown = [name for name in self.poses if name not in POSE_READINGS]
+        if unknown:
+            raise ValueError(f"poses {unknown[0]!r} are none of {', '.join(POSE_READINGS)}")
         for name in ("length_scale", "time_scale"):
             value = getattr(self, name)
             if not (np.isfinite(value) and value > 0):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -19,7 +20,7 @@ from dqslam.io.frames import FrameTimes
 from dqslam.io.readings import AS_USUAL, Readings
 from dqslam.io.sources import FormatNames
 from dqslam.io.step_covariances import read_step_covariances
-from dqslam.io.trajectory import read_trajectory
+from dqslam.io.trajectory import Trajectory, read_trajectory
 from dqslam.recording import Detections, Odometry, Recording
 from dqslam.recording.interpolation import split_steps
 
@@ -66,6 +67,7 @@ def load_recording(
     frames: FrameTimes | None = None,
     readings: Readings = AS_USUAL,
     interpolate: bool = True,
+    examine: Callable[[_core.Camera, Trajectory, DetectionTable], None] | None = None,
 ) -> tuple[Recording, Dropped]:
     """Read a recording in SE(3), where the robot is the camera, and the numbers of dropped boxes.
 
@@ -100,6 +102,9 @@ def load_recording(
     interpolate
         Whether images between two poses get poses of their own, at constant velocity. If not, a
         box belongs to the nearest pose.
+    examine
+        Called with camera, trajectory and boxes before they become a recording; what it raises
+        ends that.
 
     Raises
     ------
@@ -133,6 +138,8 @@ def load_recording(
     if len(times) < 2:
         raise FileError(odometry, "one pose only: nothing moves")
     table = _read_boxes(detections, names.detections, lens, frames, readings)
+    if examine is not None:
+        examine(lens, Trajectory(times, path), table)
     object_id = _object_ids(table, ids)
     covariance = (odometry_noise or OdometryNoise()).covariance(len(path) - 1)
     if odometry_covariance is not None:
@@ -177,11 +184,15 @@ def _read_boxes(
     readings: Readings,
 ) -> DetectionTable:
     """Read boxes, checked and cut to the image after they are read as they are meant."""
-    size = {"width": lens.width, "height": lens.height}
+    width, height = lens.width, lens.height
     if not readings.changes_boxes:
-        return readings.timed(read_detections(path, format_, frames=frames, **size))
-    raw = read_detections(path, format_, frames=frames, cut=False, check=False, **size)
-    return checked(readings.detections(raw, (lens.width, lens.height)), cut=True, **size)
+        table = read_detections(path, format_, width=width, height=height, frames=frames)
+        return readings.timed(table)
+    raw = read_detections(
+        path, format_, width=width, height=height, frames=frames, cut=False, check=False
+    )
+    table = readings.detections(raw, (width, height))
+    return checked(table, width=width, height=height, cut=True)
 
 
 def _between_poses(

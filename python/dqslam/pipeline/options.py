@@ -9,7 +9,8 @@ from pathlib import Path
 from dqslam import _core
 from dqslam.association import FINAL
 from dqslam.assumptions import BoxNoise, OdometryNoise, SizePrior, SizePriors
-from dqslam.io import FormatNames, FrameTimes
+from dqslam.io import FormatNames, FrameTimes, Readings
+from dqslam.io.readings import AS_USUAL
 from dqslam.io.recording import Ids
 
 Progress = Callable[[float, str], None]
@@ -60,6 +61,10 @@ class RunFilesOptions(RunOptions):
     the trajectory counts frames, too."""
     max_time_difference: float | None = None
     """Seconds from a box to its pose; None is half the median interval between poses."""
+    readings: Readings = AS_USUAL
+    """What numbers in the files mean, where it is not what is usual."""
+    force: bool = False
+    """Whether to go on if poses and boxes do not fit together, or would in another reading."""
     added_noise: OdometryNoise | None = None
     """Noise to add to every step of the odometry, drawn with ``seed``."""
     odometry_noise: OdometryNoise | None = None
