@@ -47,7 +47,7 @@ FIRST_CHECKS = {
     for name in ("times", "image size", "poses", "clock", "unexplained", "units", "doubles")
 } | {"clock": (check_clock_shortly, CHECKS["clock"][1])}
 #: Findings with which files make no map.
-FATAL = ("times", "image size", "poses", "unexplained")
+FATAL = ("times", "image size", "poses")
 
 
 @dataclass(frozen=True)

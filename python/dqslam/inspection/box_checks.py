@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
@@ -76,6 +77,8 @@ def check_box_form(evidence: Evidence) -> Finding | None:
     if not found or (given < IMPOSSIBLE_SHARE and _border_within(evidence)):
         return None  # an image of another size moves all rays
     named = _best_forms(evidence, found)
+    if not named:
+        return None
     words = " or ".join(f"{WORDS[form]} (--box-form {form})" for form in named)
     why = (
         f"{given:.0%} of the boxes are inverted or leave the image, read so {left[named[0]]:.0%}"
@@ -95,6 +98,10 @@ def _best_forms(evidence: Evidence, found: list[tuple[str, Floats]]) -> list[str
             continue
     if not explained:
         return [form for form, _ in found]
+    with contextlib.suppress(NotEnoughDataError):
+        given = evidence.windows().given.unexplained
+        if given <= GOOD and min(one.unexplained for _, one in explained) > given:
+            return []  # the boxes are right as they are, and of another image
     explained.sort(key=lambda one: one[1].unexplained)
     least = explained[0][1].unexplained
     return [form for form, one in explained if one.unexplained <= least / 0.75][:MOST_NAMED]

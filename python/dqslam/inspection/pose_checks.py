@@ -36,7 +36,7 @@ FEWEST_SURE = 25
 # What is left of noise by another reading must be a smaller share of it.
 FAR_LESS = 0.5
 MOST_NAMED = 3
-STILL = 1e-6  #: rotations that differ by less are the same [rad]
+STILL = 1e-6  #: poses whose numbers differ by less are the same
 
 
 @dataclass(frozen=True)
@@ -157,7 +157,10 @@ def check_explained(evidence: Evidence) -> Finding | None:
         )
     if verdict.explained != "no":
         return None
-    turns = evidence.trajectory.world_from_camera[:, 3:]
+    poses = evidence.trajectory.world_from_camera
+    if np.ptp(poses, axis=0).max() < STILL:
+        return Finding("poses", "all poses are the same, but the boxes move through the image")
+    turns = poses[:, 3:]
     if np.abs(turns - turns[0]).max() < STILL:
         return Finding(
             "poses",

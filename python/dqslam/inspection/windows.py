@@ -152,7 +152,7 @@ def fit_points(turn: Floats, position: Floats, ray: Floats, there: NDArray[np.bo
         usual = np.median(np.where(there, miss, miss[:, :1]), axis=1)[:, None]
         weight = there / (1 + (miss / (3 * usual + 1e-12)) ** 2) / np.maximum(depth, 1e-3) ** 2
         weight /= weight.max(axis=1, keepdims=True)
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore"):
         far = size[:, None] * depth / point[:, 3:]
     return Fit((miss * there).sum(axis=1) / count, error, far)
 
