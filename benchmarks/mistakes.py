@@ -2,8 +2,9 @@
 
     python -m benchmarks.mistakes --seeds 3
 
-Each mistake is made in files that are right. It is *found* if there is a warning, and *named* if the
-warning has the option, or the words, that mend it. Recordings without a mistake must have none.
+Each mistake is made in files that are right. It is *found* if there is a warning, and *named* if
+the warning has the option, or the words, that mend it. A cell has the numbers of recordings in
+which it is found and named.
 """
 
 from __future__ import annotations
@@ -183,7 +184,10 @@ MISTAKES: dict[str, tuple[Callable[[Files], Files], tuple[str, ...]]] = {
         _poses(lambda p: np.hstack([p[:, :3], np.tile([0.0, 0, 0, 1], (len(p), 1))])),
         ("all rotations are the same",),
     ),
-    "millimeters": (_poses(lambda p: p * [1000, 1000, 1000, 1, 1, 1, 1]), ("--length-scale 0.001",)),
+    "millimeters": (
+        _poses(lambda p: p * [1000, 1000, 1000, 1, 1, 1, 1]),
+        ("--length-scale 0.001",),
+    ),
     "x y width height": (
         _boxes(lambda b, _: np.hstack([b[:, :2], b[:, 2:] - b[:, :2]])),
         ("--box-form xywh",),

@@ -20,7 +20,7 @@ from dqslam.inspection.comparison import (
     difference,
 )
 from dqslam.inspection.evidence import Evidence, Finding, NotEnoughDataError
-from dqslam.inspection.pose_checks import DENSE, GOOD, NOISE
+from dqslam.inspection.pose_checks import GOOD, NOISE
 from dqslam.inspection.tracks import LEAST_SCORE
 from dqslam.io.readings import BOX_FORMS, BoxReading, form_of
 
@@ -74,8 +74,8 @@ def check_box_form(evidence: Evidence) -> Finding | None:
         counted = given >= IMPOSSIBLE_SHARE and left[form] <= LEFT_SHARE
         if counted or (given < IMPOSSIBLE_SHARE and left[form] == 0 and _preferred(evidence, box)):
             found.append((form, box))
-    if not found or (given < IMPOSSIBLE_SHARE and _border_within(evidence)):
-        return None  # an image of another size moves all rays
+    if not found or (given < IMPOSSIBLE_SHARE and _other_image(evidence, found)):
+        return None
     named = _best_forms(evidence, found)
     if not named:
         return None
@@ -86,6 +86,21 @@ def check_box_form(evidence: Evidence) -> Finding | None:
         else "rays to an object meet far better then"
     )
     return Finding("box corners", f"{WORDS[stated]} look like {words}: {why}")
+
+
+def _other_image(evidence: Evidence, found: list[tuple[str, Floats]]) -> bool:
+    """Tell whether boxes of another size of image explain as much as other forms: (form, boxes)."""
+    if _border_within(evidence):
+        return True
+    images = _fitting_images(evidence, 0.0)
+    if not images or images[0].explanation is None:
+        return False
+    least = np.inf
+    for _, box in found:
+        with contextlib.suppress(NotEnoughDataError):
+            views = _longer(evidence.windows(evidence.tracks(box), box))
+            least = min(least, _left_over(views.given))
+    return _left_over(images[0].explanation) <= least + 0.1
 
 
 def _best_forms(evidence: Evidence, found: list[tuple[str, Floats]]) -> list[str]:
@@ -117,7 +132,7 @@ def _preferred(evidence: Evidence, box: Floats) -> bool:
     except NotEnoughDataError:
         return False
     less = difference(other.windows, before.log_share, after.log_share)[0] <= np.log(0.5)
-    return less and after.unexplained <= GOOD and clearly_better(before, after)
+    return less and after.unexplained <= GOOD and _clearly_better(before, after)
 
 
 @dataclass(frozen=True)
@@ -195,11 +210,7 @@ def _fitting_images(evidence: Evidence, beyond: float) -> list[_Image]:
     noise = (
         given is None
         or views is None
-        or (
-            given.unexplained <= GOOD
-            and not given.persistence > NOISE
-            and not views.smoothness < DENSE
-        )
+        or (given.unexplained <= GOOD and not given.persistence > NOISE)
     )
     if noise and beyond < LEAVING_SHARE and _border_within(evidence) is None:
         return []  # nothing speaks against this image
@@ -244,9 +255,14 @@ def _simplest(images: list[_Image], camera: _core.Camera) -> list[_Image]:
 
 
 def _explains_better(given: Explanation | None, image: _Image) -> bool:
-    """Tell whether rays meet clearly better, in angle and as a share of the boxes' motion."""
+    """Tell whether rays meet clearly better, if that is known."""
     other = image.explanation
-    if given is None or other is None or not clearly_better(given, other):
+    return given is not None and other is not None and _clearly_better(given, other)
+
+
+def _clearly_better(given: Explanation, other: Explanation) -> bool:
+    """Tell whether rays meet clearly better, in angle and as a share of the boxes' motion."""
+    if not clearly_better(given, other):
         return False
     change, sigmas = difference(given.windows, np.log(given.miss), np.log(other.miss))
     return change <= np.log(LESS_ANGLE) and sigmas <= -SURE
@@ -256,8 +272,12 @@ def _badness(image: _Image) -> float:
     """Rank images by how well rays meet; those alike by how simple they are."""
     if image.explanation is None:
         return image.impossible
-    angle = float(np.mean(np.log(image.explanation.miss)))
-    return round(angle + float(image.explanation.log_share.mean()), 1) + image.impossible
+    return round(_left_over(image.explanation), 1) + image.impossible
+
+
+def _left_over(explanation: Explanation) -> float:
+    """Return the mean logarithm of angle and share of motion that are left."""
+    return float(np.mean(np.log(explanation.miss)) + explanation.log_share.mean())
 
 
 def _images(camera: _core.Camera) -> Iterable[BoxReading]:

@@ -14,7 +14,6 @@ from dqslam.inspection.comparison import (
     WindowViews,
     alike,
     clearly_better,
-    difference,
 )
 from dqslam.inspection.evidence import Evidence, Finding, NotEnoughDataError, median_residual
 from dqslam.inspection.pose_readings import describe, unusual_readings, usual_readings
@@ -28,11 +27,11 @@ GOOD, SUSPECT, NOISY = 0.35, 0.15, 0.6
 WELL = 0.1
 # Boxes keep their motion from view to view where images are dense. Only there can noise be told
 # from a wrong reading. Differences of the noise of single poses, not of steps, are below LEAST.
-DENSE, NOISE, LEAST = 0.25, 0.2, -0.3
+DENSE, APART, NOISE, LEAST = 0.15, 0.2, 0.2, -0.3
 # What persists to a larger degree is no noise at all.
 SYSTEMATIC = 0.25
 # With fewer windows, and no more to judge by, nothing is said.
-FEWEST_SURE = 25
+FEWEST_SURE = 40
 # What is left of noise by another reading must be a smaller share of it.
 FAR_LESS = 0.5
 MOST_NAMED = 3
@@ -62,13 +61,18 @@ class Verdict:
     def explained(self) -> Literal["yes", "partly", "noisy", "unsure", "no"]:
         """Whether the poses explain the boxes, or noise or a lack of data hides that."""
         if self.unexplained > NOISY:
-            if self.smoothness >= DENSE and LEAST <= self.persistence <= NOISE:
+            if is_noise(self.persistence, self.smoothness) and self.persistence >= LEAST:
                 return "noisy"
             few = np.isnan(self.smoothness) and self.windows < FEWEST_SURE
             return "unsure" if few else "no"
         if self.unexplained > SUSPECT and self.persistence > SYSTEMATIC:
             return "no"
         return "yes" if self.unexplained <= GOOD else "partly"
+
+
+def is_noise(persistence: float, smoothness: float) -> bool:
+    """Tell whether what is left is noise, in boxes that move smoothly enough to tell."""
+    return persistence <= NOISE and smoothness >= max(DENSE, persistence + APART)
 
 
 def judge(evidence: Evidence) -> Verdict:
@@ -105,19 +109,15 @@ def check_poses(evidence: Evidence) -> Finding | None:
     given = views.given
     if given.unexplained <= WELL and not given.persistence > NOISE:
         return None
+    noise = is_noise(given.persistence, views.smoothness)
+    unsure = noise or bool(np.isnan(given.persistence) or np.isnan(views.smoothness))
     best = _best(views, given, usual_readings())
-    if views.smoothness >= DENSE and given.persistence <= NOISE:
-        # Nothing but noise is left: another reading must leave far less of it.
-        far = np.log(FAR_LESS)
-        best = [
-            one
-            for one in best
-            if difference(views.windows, given.log_share, one[1].log_share)[0] < far
-        ]
-    elif not best or best[0][1].unexplained > WELL:
+    if not unsure and (not best or best[0][1].unexplained > WELL):
         first = best[0][1] if best else given
         best = _best(views, first, unusual_readings()) or best
-    if not best or best[0][1].unexplained > NOISY:
+    # If nothing but noise is left, or that is not known, another reading must leave far less.
+    most = min(GOOD, FAR_LESS * given.unexplained) if unsure else NOISY
+    if not best or best[0][1].unexplained > most:
         return None
     named = [describe(reading) for reading, _ in best[:MOST_NAMED]]
     return Finding(
