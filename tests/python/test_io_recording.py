@@ -147,7 +147,11 @@ def test_boxes_meet_the_nearest_pose(files, orbit):
             f"{float(line.split()[0]) + shift!r} " + line.split(" ", 1)[1] for line in lines
         ],
     )
-    assert load_recording(*files)[1].without_pose == 0
+    assert load_recording(*files, interpolate=False)[1].without_pose == 0
+    # The four boxes of the first image are before the first pose; others are between two.
+    recording, dropped = load_recording(*files)
+    assert dropped.without_pose == 4
+    assert len(recording.timestamps) == 2 * len(orbit.times) - 1
     with pytest.raises(FileError, match="160 further than 0.02 s from a pose"):
         load_recording(*files, max_time_difference=0.02)
 

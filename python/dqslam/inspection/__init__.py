@@ -37,7 +37,7 @@ CHECKS: dict[str, tuple[Check, tuple[str, ...]]] = {
     "units": (check_units, (*FORMS, "poses", "unexplained")),
     "distortion": (check_distortion, (*FORMS, "poses", "clock", "unexplained")),
     "boxes": (check_boxes, ("box corners", "image size")),
-    "doubles": (check_doubles, ()),
+    "doubles": (check_doubles, FORMS),
 }
 
 

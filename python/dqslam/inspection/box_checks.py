@@ -20,7 +20,8 @@ from dqslam.inspection.comparison import (
     difference,
 )
 from dqslam.inspection.evidence import Evidence, Finding, NotEnoughDataError
-from dqslam.inspection.pose_checks import GOOD, NOISE
+from dqslam.inspection.pose_checks import GOOD, NOISE, best_readings
+from dqslam.inspection.pose_readings import usual_readings
 from dqslam.inspection.tracks import LEAST_SCORE
 from dqslam.io.readings import BOX_FORMS, BoxReading, form_of
 
@@ -141,8 +142,8 @@ class _Image:
 
     reading: BoxReading
     impossible: float  #: share of the boxes that would leave it
-    views: WindowViews | None
-    explanation: Explanation | None
+    given: WindowViews | None  #: the views of boxes as they are
+    explanation: Explanation | None  #: of boxes that are of this image
 
 
 def check_image_size(evidence: Evidence) -> Finding | None:
@@ -175,7 +176,7 @@ def check_image_size(evidence: Evidence) -> Finding | None:
     elif border is not None:
         why = f"{border}, but {image} does not"
     images = _fitting_images(evidence, beyond)
-    if why is None and not images:
+    if why is None and (not images or (beyond < LEAVING_SHARE and _poses_are_it(images[0]))):
         return None
     if not images:
         return Finding("image size", f"{why}; --box-image gives the size of the image of boxes")
@@ -189,6 +190,15 @@ def check_image_size(evidence: Evidence) -> Finding | None:
     scaled = any(not one.reading.letterbox for one in images)
     other = "; or fx fy cx cy are of an image of another size" if scaled else ""
     return Finding("image size", f"{why}; they look like those of {named}{other}")
+
+
+def _poses_are_it(image: _Image) -> bool:
+    """Tell whether another reading of the poses explains boxes better than another image does."""
+    if image.given is None or image.explanation is None:
+        return False
+    poses = best_readings(image.given, image.given.given, usual_readings())
+    least = min((float(one.log_share.mean()) for _, one in poses), default=np.inf)
+    return least < float(image.explanation.log_share.mean())
 
 
 def _named(reading: BoxReading) -> str:
@@ -221,9 +231,7 @@ def _fitting_images(evidence: Evidence, beyond: float) -> list[_Image]:
         if impossible > LEFT_SHARE:
             continue
         moved = None if views is None else replace(views, middle=_middle(box)[views.windows.rows])
-        found.append(
-            _Image(reading, impossible, moved, None if moved is None else moved.explanation())
-        )
+        found.append(_Image(reading, impossible, views, None if moved is None else moved.given))
     better = [one for one in found if _explains_better(given, one)]
     if not better and beyond >= LEAVING_SHARE:
         better = [

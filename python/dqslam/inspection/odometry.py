@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dqslam.inspection.evidence import Evidence, Finding, NotEnoughDataError
+from dqslam.inspection.pose_checks import NOISY
 from dqslam.inspection.tracks import doubles
 from dqslam.inspection.windows import LENGTHS
 
@@ -22,6 +23,8 @@ MOST_DOUBLES = 0.1
 def check_units(evidence: Evidence) -> Finding | None:
     """Check whether objects have sizes of objects, if lengths are meters."""
     views = evidence.windows()
+    if views.given.unexplained > NOISY:
+        raise NotEnoughDataError("the poses do not explain the boxes")
     fit = views.fit()
     rows, there = views.windows.rows, views.windows.there & (views.windows.length > 0)[:, None]
     if not there.any():

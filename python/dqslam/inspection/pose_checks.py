@@ -111,10 +111,10 @@ def check_poses(evidence: Evidence) -> Finding | None:
         return None
     noise = is_noise(given.persistence, views.smoothness)
     unsure = noise or bool(np.isnan(given.persistence) or np.isnan(views.smoothness))
-    best = _best(views, given, usual_readings())
+    best = best_readings(views, given, usual_readings())
     if not unsure and (not best or best[0][1].unexplained > WELL):
         first = best[0][1] if best else given
-        best = _best(views, first, unusual_readings()) or best
+        best = best_readings(views, first, unusual_readings()) or best
     # If nothing but noise is left, or that is not known, another reading must leave far less.
     most = min(GOOD, FAR_LESS * given.unexplained) if unsure else NOISY
     if not best or best[0][1].unexplained > most:
@@ -128,7 +128,7 @@ def check_poses(evidence: Evidence) -> Finding | None:
     )
 
 
-def _best(
+def best_readings(
     views: WindowViews, given: Explanation, readings: Iterable[PoseReading]
 ) -> list[tuple[PoseReading, Explanation]]:
     """Return the best of the readings that are clearly better, and those that are as good."""

@@ -17,6 +17,7 @@ Ints = NDArray[np.int64]
 
 # The motion that ends a window, as a share of the extent of all middles; the last one never ends.
 LENGTHS = (0.1, 0.4, np.inf)
+LEAST_MOTION = 0.02  #: of a whole track, as a share of that extent
 FEWEST_VIEWS, MOST_VIEWS = 4, 8
 # The most windows of a length, to save time.
 MOST_WINDOWS = 60
@@ -26,6 +27,7 @@ ITERATIONS = 3
 # No share counts as less: differences below are noise.
 LEAST_SHARE = 0.02
 BEHIND = 20.0  #: the miss of a view that has the point behind it, at depth 1
+NEAREST = 1e-3  #: the least distance of a point from its cameras, in their spread
 FEWEST_STEPS = 40
 
 
@@ -59,7 +61,7 @@ def find_windows(
     found: list[Ints] = []
     length: list[int] = []
     for number, share in enumerate(LENGTHS):
-        of_length = [part for track in tracks for part in _cut(track, middle, share * extent)]
+        of_length = [part for track in tracks for part in _cut(track, middle, share, extent)]
         if len(of_length) > most:
             chosen = np.linspace(0, len(of_length) - 1, most).round().astype(int)
             of_length = [of_length[i] for i in chosen]
@@ -77,10 +79,12 @@ def find_windows(
     return Windows(rows, there, np.array(length), np.searchsorted(bounds, when))
 
 
-def _cut(track: Ints, middle: Floats, extent: float) -> list[Ints]:
+def _cut(track: Ints, middle: Floats, share: float, extent: float) -> list[Ints]:
     """Cut a track where its middles have moved far enough; what is left over is dropped."""
-    if not np.isfinite(extent):
-        return [_thinned(track)] if len(track) >= FEWEST_VIEWS else []
+    if not np.isfinite(share):
+        moved = float(np.ptp(middle[track], axis=0).max())
+        enough = len(track) >= FEWEST_VIEWS and moved > LEAST_MOTION * extent
+        return [_thinned(track)] if enough else []
     parts: list[Ints] = []
     place = middle[track]
     start = 0
@@ -90,7 +94,7 @@ def _cut(track: Ints, middle: Floats, extent: float) -> list[Ints]:
         while end is None:
             moved = np.linalg.norm(place[start : start + reach] - place[start], axis=1)
             moved[: FEWEST_VIEWS - 1] = 0.0
-            far = np.flatnonzero(moved >= extent)
+            far = np.flatnonzero(moved >= share * extent)
             if far.size:
                 end = start + int(far[0])
             elif start + reach >= len(track):
@@ -167,8 +171,10 @@ def _nearest(rows: Floats, weight: Floats, turn: Floats, local: Floats) -> Float
     seen = weight > 0
     side = np.where(np.sum(np.sign(depth) * seen, axis=1) < 0, -1.0, 1.0)
     point = point * side[:, None]
-    # A point beyond infinity is behind the cameras: the best direction then takes its place.
+    # A point beyond infinity is behind the cameras, and without a baseline any point is at their
+    # center: the best direction then takes its place.
     beyond = point[:, 3] < 0
+    beyond |= np.linalg.norm(point[:, :3], axis=1) < NEAREST * point[:, 3]
     if beyond.any():
         direction = np.linalg.eigh(normal[beyond][:, :3, :3])[1][..., 0]
         ahead = np.sum(np.einsum("wni,wi->wn", turn[beyond][..., 2], direction), axis=1)

@@ -100,8 +100,9 @@ def load_recording(
     readings
         What numbers in the files mean, where it is not what is usual.
     interpolate
-        Whether images between two poses get poses of their own, at constant velocity. If not, a
-        box belongs to the nearest pose.
+        Whether images between two poses get poses of their own, at constant velocity, and those
+        before the first and after the last pose are left out. If not, a box belongs to the nearest
+        pose.
     examine
         Called with camera, trajectory and boxes before they become a recording; what it raises
         ends that.
@@ -146,10 +147,11 @@ def load_recording(
         covariance = read_step_covariances(odometry_covariance, times)
     steps = Odometry.from_poses(path, covariance=covariance)
     _, late = nearest_pose(times, table.timestamp)
-    tolerance = 0.5 * float(np.median(np.diff(times))) * (1 + ROUNDING)
-    if max_time_difference is not None:
-        tolerance = max_time_difference
+    half = 0.5 * float(np.median(np.diff(times)))
+    tolerance = half * (1 + ROUNDING) if max_time_difference is None else max_time_difference
     if interpolate:
+        outside = (table.timestamp < times[0]) | (table.timestamp > times[-1])
+        late[outside & (late > 2 * NEAR_SHARE * half)] = np.inf
         steps, times = split_steps(steps, times, _between_poses(table.timestamp, late, times))
     pose, apart = nearest_pose(times, table.timestamp)
     final = final_ids and ids != "none"
