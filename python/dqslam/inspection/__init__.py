@@ -8,12 +8,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from dqslam import _core
-from dqslam.inspection.box_checks import check_box_form, check_image_size
+from dqslam.inspection.box_checks import check_box_form
 from dqslam.inspection.checks import check_boxes, check_distortion
 from dqslam.inspection.clock import ClockOffset as ClockOffset
 from dqslam.inspection.clock import check_clock, check_clock_shortly, estimate_clock_offset
 from dqslam.inspection.evidence import Evidence, NotEnoughDataError
 from dqslam.inspection.evidence import Finding as Finding
+from dqslam.inspection.image_checks import check_image_size
 from dqslam.inspection.odometry import check_doubles, check_units, note_jumps
 from dqslam.inspection.pose_checks import Verdict as Verdict
 from dqslam.inspection.pose_checks import check_explained, check_poses, judge
