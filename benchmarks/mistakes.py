@@ -120,7 +120,7 @@ def _drifting(files: Files) -> Files:
 
 
 def _letterboxed(box: Floats, size: Floats) -> Floats:
-    return box + np.tile((size.max() - size) / 2, 2)
+    return np.asarray(box + np.tile((size.max() - size) / 2, 2))
 
 
 def _mirrored(poses: Floats) -> Floats:

@@ -44,7 +44,7 @@ def edit_boxes(folder, change):
 
 
 def test_right_files_raise_no_doubt(folder, capsys):
-    assert call("run", folder, "--ids", "none") == 0
+    assert call("run", folder, "--ids", "track_id") == 0
     assert capsys.readouterr().err == ""
     assert report(folder)["doubts"] == []
     assert len(report(folder)["objects"]) == 8
@@ -53,7 +53,7 @@ def test_right_files_raise_no_doubt(folder, capsys):
 def test_poses_that_another_reading_explains_stop_a_run(folder, capsys):
     times, poses = read_trajectory(folder / "odometry.txt")
     write_trajectory(folder / "odometry.txt", times, turned(poses, OPENGL_AXES))
-    assert call("run", folder, "--ids", "none") == 2
+    assert call("run", folder, "--ids", "track_id") == 2
     shown = capsys.readouterr().err
     assert "the files do not fit together: poses: the poses look like the axes of OpenGL" in shown
     assert "--poses opengl" in shown
@@ -62,7 +62,7 @@ def test_poses_that_another_reading_explains_stop_a_run(folder, capsys):
     assert call("inspect", folder, "--strict") == 3
     assert "--poses opengl" in capsys.readouterr().out
     assert call("inspect", folder, "--strict", "--poses", "opengl") == 0
-    assert call("run", folder, "--ids", "none", "--poses", "opengl") == 0
+    assert call("run", folder, "--ids", "track_id", "--poses", "opengl") == 0
     assert len(report(folder)["objects"]) == 8
 
 
@@ -93,9 +93,9 @@ def test_a_run_can_be_forced_and_stays_doubtful(folder, capsys):
 )
 def test_what_is_named_mends_the_run(folder, capsys, mistake, named, options):
     edit_boxes(folder, mistake)
-    assert call("run", folder, "--ids", "none") == 2
+    assert call("run", folder, "--ids", "track_id") == 2
     assert named in capsys.readouterr().err
-    assert call("run", folder, "--ids", "none", *options) == 0
+    assert call("run", folder, "--ids", "track_id", *options) == 0
     assert len(report(folder)["objects"]) == 8
 
 
@@ -109,7 +109,7 @@ def test_millimeters_are_doubtful(folder, capsys):
 
 def test_times_of_boxes_are_shifted(folder):
     edit_boxes(folder, lambda table: table + [7.0, 0, 0, 0, 0])
-    assert call("run", folder, "--ids", "none", "--time-offset", "-7") == 0
+    assert call("run", folder, "--ids", "track_id", "--time-offset", "-7") == 0
     assert report(folder)["dropped_boxes"]["without_pose"] == 0
 
 

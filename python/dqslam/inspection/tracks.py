@@ -87,7 +87,8 @@ def doubles(table: DetectionTable, rows: NDArray[np.int64]) -> NDArray[np.bool_]
     """Tell which boxes (m,) show what a better box of their class in the same image shows."""
     double = np.zeros(len(rows), dtype=np.bool_)
     order = np.lexsort((-table.score[rows], table.class_id[rows], table.frame[rows]))
-    boxes, frame, number = (part[rows][order] for part in (table.box, table.frame, table.class_id))
+    boxes = table.box[rows][order]
+    frame, number = table.frame[rows][order], table.class_id[rows][order]
     for step in range(1, MOST_ALIKE):
         same = (frame[step:] == frame[:-step]) & (number[step:] == number[:-step])
         if not same.any():
