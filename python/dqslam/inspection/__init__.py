@@ -89,9 +89,9 @@ def inspect_recording(
     findings, unchecked = run_checks(evidence, CHECKS)
     verdict: Verdict | None = None
     clock: ClockOffset | None = None
+    with contextlib.suppress(NotEnoughDataError):
+        verdict = judge(evidence)
     if not any(name in findings for name in FORMS):
-        with contextlib.suppress(NotEnoughDataError):
-            verdict = judge(evidence)
         with contextlib.suppress(NotEnoughDataError):
             clock = estimate_clock_offset(evidence)
     return Inspection(
