@@ -8,6 +8,7 @@ import realdata
 from console import assert_one_line_of_error
 from dqslam.cli import main
 
+TOO_STILL = "too few boxes move from view to view"
 TOO_FEW = "only 4 objects to compare lenses with"
 
 
@@ -20,7 +21,13 @@ def call(files, *more):
 def test_the_summary(files, capsys):
     assert call(files, "--ids", "track_id", "--json") == 0
     content = json.loads(capsys.readouterr().out)
-    assert (content["warnings"], content["unchecked"]) == ([], {"distortion": TOO_FEW})
+    assert content["warnings"] == content["notes"] == []
+    assert content["unchecked"] == {"distortion": TOO_FEW, "clock": TOO_STILL}
+    assert content["clock"] is None
+    # Poses and boxes are exact, but boxes are of ellipsoids, whose middles are not quite points.
+    assert content["fit"]["explained"] == "yes"
+    assert content["fit"]["unexplained"] < 0.05
+    assert content["fit"]["track_px"] < 2
     path, boxes = content["trajectory"], content["detections"]
     assert (path["poses"], path["start_s"], path["gaps"]) == (40, 100, [])
     assert path["rate_hz"] == pytest.approx(10)

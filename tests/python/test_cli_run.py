@@ -253,8 +253,11 @@ def test_nothing_at_rest_is_said(files, capsys, ids):
         cells[2:6] = map(repr, (x, y, x + 60, y + 60))
         lines[row] = ",".join(cells)
     files[2].write_text("\n".join(lines) + "\n")
-    assert call(files, "--ids", ids) == 0
-    shown = capsys.readouterr().out
+    assert call(files, "--ids", ids) == 3
+    shown, warned = capsys.readouterr()
+    assert "warning: unexplained: no reading of the files explains" in warned
+    assert "warning: the map is empty, though there are 160 boxes" in warned
+    assert len(report(files)["doubts"]) == 2
     assert "no object fits a world at rest: the trajectory is the odometry" in shown
     assert "no box shows an object of the map" in shown
     assert report(files)["objects"] == []

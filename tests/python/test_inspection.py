@@ -104,9 +104,9 @@ def test_all_is_well(right):
 def test_inverted_poses_are_found(right):
     camera, (times, poses), table, ids = right
     inspection = inspect(camera, Trajectory(times, inverted(poses)), table, ids)
-    assert [finding.check for finding in inspection.findings] == ["pose direction"]
+    assert [finding.check for finding in inspection.findings] == ["poses"]
     assert "camera_from_world" in inspection.findings[0].message
-    assert inspection.unchecked["distortion"] == "pose direction comes first"
+    assert inspection.unchecked["distortion"] == "poses comes first"
 
 
 def test_width_and_height_for_corners_are_found(right):
@@ -120,7 +120,8 @@ def test_width_and_height_for_corners_are_found(right):
 def test_corners_for_width_and_height_are_found(right):
     camera, trajectory, table, ids = right
     box = np.hstack([table.box[:, :2], table.box[:, 2:] + table.box[:, :2]])
-    (finding,) = inspect(camera, trajectory, replace(table, box=box), ids).findings
+    stated = replace(table, box=box, columns=("left", "top", "width", "height"))
+    (finding,) = inspect(camera, trajectory, stated, ids).findings
     assert finding.check == "box corners"
     assert finding.message.startswith("x, y, width, height look like x1 y1 x2 y2")
 
@@ -156,7 +157,10 @@ def test_odometry_that_drifts_is_no_mistake(right):
     steps = _core.plus(_core.PoseModel.SE3, steps, noise)
     drifted = _core.dead_reckon(_core.PoseModel.SE3, poses[0], steps)
     assert found(camera, Trajectory(times, drifted), table, ids) == []
-    assert found(camera, Trajectory(times, inverted(drifted)), table, ids) == ["pose direction"]
+    inspection = inspect(camera, Trajectory(times, inverted(drifted)), table, ids)
+    checks = [finding.check for finding in inspection.findings]
+    # A few boxes of one object do not tell; and much noise may leave no reading that explains.
+    assert checks in (["poses"], ["unexplained"]) or inspection.verdict.explained == "unsure"
 
 
 @pytest.mark.parametrize("name", ["milliseconds", "microseconds", "nanoseconds"])
@@ -176,7 +180,7 @@ def test_clocks_that_do_not_meet_are_found(right):
     inspection = inspect(camera, late, table, ids)
     assert [finding.check for finding in inspection.findings] == ["times"]
     assert inspection.findings[0].message.startswith("no box has a pose within")
-    assert inspection.unchecked["pose direction"] == "times comes first"
+    assert inspection.unchecked["poses"] == "times comes first"
 
 
 def test_a_lens_whose_distortion_is_missing_is_found():
@@ -245,15 +249,17 @@ def test_what_cannot_be_told_is_said(tmp_path):
     still = Trajectory(trajectory.timestamps, np.tile([0, 0, 0, 0, 0, 0, 1.0], (60, 1)))
     inspection = inspect(camera, still, same, "track_id")
     assert inspection.findings == ()
-    why = "no object is seen from directions that differ enough"
-    assert inspection.unchecked == {"pose direction": why, "distortion": why}
-    inspection = inspect(camera, still, table, "track_id")
-    assert inspection.unchecked == {
-        "pose direction": "no reading of the poses puts the objects in front of the camera",
-        "distortion": "rays miss each other by more than the image, too much to compare lenses",
-    }
+    assert inspection.verdict is None
+    assert inspection.unchecked["poses"] == (
+        "no object moves through the image and is seen often enough"
+    )
+    assert inspection.unchecked["distortion"] == (
+        "no object is seen from directions that differ enough"
+    )
+    (finding,) = inspect(camera, still, table, "track_id").findings
+    assert str(finding) == "poses: all poses are the same, but the boxes move through the image"
     few = replace(table, class_id=np.arange(len(table)))
-    assert inspect(camera, trajectory, few, None).unchecked["pose direction"] == (
+    assert inspect(camera, trajectory, few, None).unchecked["poses"] == (
         "no object is seen often enough from known poses"
     )
     with pytest.raises(ValueError, match="one pose only"):

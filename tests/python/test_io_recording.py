@@ -100,7 +100,7 @@ def test_of_several_boxes_the_nearest_in_time_wins_then_the_best(files, orbit):
             f"4,{time + 0.03!r},1,1,9,9,0.99,1,cup,101",
         ],
     )
-    recording, dropped = load_recording(*files)
+    recording, dropped = load_recording(*files, interpolate=False)
     detections = recording.detections
     row = np.flatnonzero((detections.pose == 3) & (detections.object_id == 101))
     np.testing.assert_array_equal(detections.box[row], [[5, 5, 9, 9]])
@@ -117,11 +117,11 @@ def test_of_several_images_at_a_pose_the_nearest_is_whole(files, orbit):
     edit(files[2], tenfold)
     time = orbit.times[3].item() + 0.03
     add_rows(files[2], *(f"35,{time!r},{x},5,{x + 9},14,0.9,1,cup,{x}" for x in (5, 50)))
-    recording, dropped = load_recording(*files, ids="none")
+    recording, dropped = load_recording(*files, ids="none", interpolate=False)
     assert dropped.repeated == 2
     assert np.sum(recording.detections.pose == 3) == 4
     edit(files[2], lambda lines: [line for line in lines if not line.startswith("30,")])
-    recording, dropped = load_recording(*files, ids="none")
+    recording, dropped = load_recording(*files, ids="none", interpolate=False)
     assert dropped.repeated == 0
     np.testing.assert_array_equal(
         recording.detections.box[recording.detections.pose == 3], [[5, 5, 14, 14], [50, 5, 59, 14]]
@@ -149,7 +149,11 @@ def test_boxes_meet_the_nearest_pose(files, orbit):
             f"{float(line.split()[0]) + shift!r} " + line.split(" ", 1)[1] for line in lines
         ],
     )
-    assert load_recording(*files)[1].without_pose == 0
+    assert load_recording(*files, interpolate=False)[1].without_pose == 0
+    # The four boxes of the first image are before the first pose; others are between two.
+    recording, dropped = load_recording(*files)
+    assert dropped.without_pose == 4
+    assert len(recording.timestamps) == 2 * len(orbit.times) - 1
     with pytest.raises(FileError, match="160 further than 0.02 s from a pose"):
         load_recording(*files, max_time_difference=0.02)
 

@@ -40,7 +40,7 @@ EXIT_CODES = {
     0: "done",
     1: "a mistake in dqslam itself; its traceback is shown",
     2: "bad input: options, files, or a problem that they do not determine",
-    3: "done, and `inspect --strict` has found a likely mistake",
+    3: "done, but the result of `run` is doubtful, or `inspect --strict` has found a mistake",
     130: "stopped by Ctrl-C",
 }
 

@@ -18,6 +18,7 @@ from dqslam.cli.options import (
     Topics,
     given_frame_times,
     given_reading,
+    given_readings,
 )
 from dqslam.cli.output import Json, Output, Quiet
 from dqslam.cli.settings import ConfigFile
@@ -74,7 +75,8 @@ def convert(
     output = Output(quiet=quiet, as_json=json)
     inputs = (source, camera, frame_times, classes, camera_in_body)
     refuse_shared_input(*inputs, odometry_covariance)
-    reading = given_reading(first_frame, max_bad, nms, topics, camera_in_body, image_size)
+    readings = given_readings(camera_in_body=camera_in_body)
+    reading = given_reading(first_frame, max_bad, nms, topics, image_size, readings=readings)
     size = reading.image_size
     if camera is not None:
         lens = io.read_camera(camera, camera_id=camera_id, image_size=size)
@@ -87,7 +89,7 @@ def convert(
         frames=given_frame_times(frame_times, frame_rate),
         first_frame=first_frame,
         classes=None if classes is None else io.read_class_names(classes),
-        body_from_camera=reading.body_from_camera,
+        body_from_camera=readings.body_from_camera,
         nms=nms,
         notes=notes,
     )

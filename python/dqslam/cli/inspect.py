@@ -6,6 +6,8 @@ import typer
 
 from dqslam._input import refuse_shared_input
 from dqslam.cli.options import (
+    BoxForm,
+    BoxImage,
     CameraFile,
     CameraId,
     CameraInBody,
@@ -15,13 +17,19 @@ from dqslam.cli.options import (
     FrameRate,
     FrameTimesFile,
     ImageSize,
+    LengthScale,
+    Letterbox,
     MaxBad,
     MaxTimeDifference,
     Nms,
     OdometryFile,
+    PosesAs,
+    TimeOffset,
+    TimeScale,
     Topics,
     given_frame_times,
     given_reading,
+    given_readings,
 )
 from dqslam.cli.output import Json, Output, Quiet
 from dqslam.cli.settings import ConfigFile
@@ -45,7 +53,6 @@ def inspect(
     frame_times: FrameTimesFile = None,
     frame_rate: FrameRate = None,
     first_frame: FirstFrame = None,
-    camera_in_body: CameraInBody = None,
     image_size: ImageSize = None,
     topics: Topics = None,
     nms: Nms = None,
@@ -55,6 +62,14 @@ def inspect(
         typer.Option(help="Column with the ids of objects. Default: boxes are linked by overlap."),
     ] = None,
     max_time_difference: MaxTimeDifference = None,
+    poses: PosesAs = None,
+    camera_in_body: CameraInBody = None,
+    length_scale: LengthScale = 1.0,
+    box_form: BoxForm = None,
+    box_image: BoxImage = None,
+    letterbox: Letterbox = False,
+    time_offset: TimeOffset = 0.0,
+    time_scale: TimeScale = 1.0,
     strict: Annotated[
         bool,
         typer.Option(
@@ -67,8 +82,8 @@ def inspect(
 ) -> None:
     """Show the content of a recording, and warn of the usual mistakes.
 
-    These are inverted poses, x y width height instead of corners, another image size, missing lens
-    distortion, and clocks that do not match. Each check compares two interpretations of the files.
+    Other readings of poses, boxes and times are tried, and one that fits far better is named with
+    its option. If none explains where the boxes are, that is said, too.
     """
     from dqslam import io
     from dqslam.inspection import inspect_recording
@@ -79,8 +94,18 @@ def inspect(
     with output.steps("inspecting", 3) as done:
         frames = given_frame_times(frame_times, frame_rate)
         frames = frames or io.choose_frame_times(odometry, detections, names)
+        readings = given_readings(
+            poses=poses,
+            camera_in_body=camera_in_body,
+            length_scale=length_scale,
+            box_form=box_form,
+            box_image=box_image,
+            letterbox=letterbox,
+            time_offset=time_offset,
+            time_scale=time_scale,
+        )
         reading = given_reading(
-            first_frame, max_bad, nms, topics, camera_in_body, image_size, camera_id
+            first_frame, max_bad, nms, topics, image_size, camera_id, readings=readings
         )
         io.check_topics(camera, odometry, detections, reading)
         notes = io.Notes(max_bad=max_bad)
@@ -101,23 +126,70 @@ def inspect(
 
 def _show(output: Output, inspection: "Inspection", notes: "Notes") -> None:
     output.table(_overview(inspection.summary))
+    for line in _fit(inspection):
+        output.line(line)
     for sentence in notes.sentences():
         output.warn(sentence)
     for finding in inspection.findings:
-        output.line(f"warning: {finding.check}: {finding.message}", style="bold red")
+        output.line(f"warning: {finding}", style="bold red")
+    for note in inspection.notes:
+        output.line(f"note: {note}")
     for check, why in inspection.unchecked.items():
         output.line(f"not checked: {check}: {why}")
     if not inspection.findings:
-        output.line("no mistake found")
+        output.line(_conclusion(inspection))
     warnings = [vars(finding) for finding in inspection.findings]
+    verdict, clock = inspection.verdict, inspection.clock
+    fit = None if verdict is None else vars(verdict) | {"explained": verdict.explained}
+    offset = None if clock is None else vars(clock) | {"sure": clock.sure}
     output.document(
         {
             **inspection.summary,
+            "fit": fit,
+            "clock": offset,
             "warnings": warnings,
+            "notes": inspection.notes,
             "unchecked": inspection.unchecked,
             "input_notes": notes.described(),
         }
     )
+
+
+def _fit(inspection: "Inspection") -> list[str]:
+    """Say how well poses explain the boxes, beside what right files give."""
+    from dqslam.inspection import pixels
+
+    verdict, clock = inspection.verdict, inspection.clock
+    if verdict is None:
+        return ["rays: unknown, as no object is seen often enough from different poses"]
+    lines = [
+        f"rays to an object miss each other by {pixels(verdict.track_px)} over whole tracks, by "
+        f"{verdict.short_px:.1f} px in short windows, in which boxes move by "
+        f"{verdict.short_motion_px:.0f} px (right files: a few px, or what odometry drifts by)",
+        f"the poses leave {verdict.unexplained:.0%} of the boxes' motion unexplained (right files: "
+        f"2 to 15%, with noisy odometry to 35%)",
+    ]
+    if clock is not None:
+        when = "later" if clock.seconds > 0 else "earlier"
+        lines.append(
+            f"clock: boxes fit best {abs(clock.seconds):.3g} ± {clock.sigma:.2g} s {when} than "
+            f"their times say{'' if clock.sure else ', which may be chance'}"
+        )
+    return lines
+
+
+def _conclusion(inspection: "Inspection") -> str:
+    """Say what was not found, and what was not looked at."""
+    verdict = inspection.verdict
+    explained = "unsure" if verdict is None else verdict.explained
+    if explained == "yes":
+        return "no mistake found"
+    if explained == "partly":
+        return (
+            "no mistake found, but much of the boxes' motion is unexplained: the odometry is "
+            "noisy, or there is a mistake that is none of those that were tried"
+        )
+    return "no mistake found, but whether poses and boxes fit together cannot be told"
 
 
 def _overview(summary: dict[str, Any]) -> "Table":

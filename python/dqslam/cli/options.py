@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 if TYPE_CHECKING:
-    from dqslam.io import FrameTimes, ReadOptions
+    from dqslam.io import FrameTimes, Readings, ReadOptions
 
 CameraFile = Annotated[
     Path, typer.Option(help="Camera file: JSON, TOML, ROS, OpenCV, Kalibr, COLMAP, KITTI, bag, ...")
@@ -69,12 +69,6 @@ Topics = Annotated[
         "--topic", metavar="NAME", help="Topic, if a bag has several of a kind; repeatable."
     ),
 ]
-CameraInBody = Annotated[
-    Path | None,
-    typer.Option(
-        help="File with body_from_camera, 7, 12 or 16 numbers, if the poses are a body's."
-    ),
-]
 ImageSize = Annotated[
     str | None,
     typer.Option(
@@ -95,6 +89,69 @@ ClosuresFile = Annotated[
 MaxTimeDifference = Annotated[
     float | None,
     typer.Option(help="Most seconds from a box to its pose. Default: half the interval of poses."),
+]
+# What numbers in the files mean, where it is not what is usual.
+PosesAs = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--poses",
+        metavar="READING",
+        help="What poses are: camera_from_world, w_first (quaternions), opengl or body (axes); "
+        "repeatable.",
+        rich_help_panel="What numbers mean",
+    ),
+]
+CameraInBody = Annotated[
+    Path | None,
+    typer.Option(
+        help="File with body_from_camera, 7, 12 or 16 numbers, if the poses are a body's.",
+        rich_help_panel="What numbers mean",
+    ),
+]
+LengthScale = Annotated[
+    float,
+    typer.Option(
+        help="Meters in the unit of positions: 0.001 for millimeters.",
+        rich_help_panel="What numbers mean",
+    ),
+]
+BoxForm = Annotated[
+    Literal["xyxy", "xywh", "cxcywh", "yxyx"] | None,
+    typer.Option(
+        help="What the four numbers of a box are. Default: what the format says.",
+        rich_help_panel="What numbers mean",
+    ),
+]
+BoxImage = Annotated[
+    str | None,
+    typer.Option(
+        metavar="WxH",
+        help="Size of the image that boxes are of, if it is scaled; 1x1 for shares of the image.",
+        rich_help_panel="What numbers mean",
+    ),
+]
+Letterbox = Annotated[
+    bool,
+    typer.Option(
+        "--letterbox",
+        help="The image of --box-image has bars beside or above the camera's.",
+        rich_help_panel="What numbers mean",
+    ),
+]
+TimeOffset = Annotated[
+    float,
+    typer.Option(
+        metavar="SECONDS",
+        help="Added to the times of boxes.",
+        rich_help_panel="What numbers mean",
+    ),
+]
+TimeScale = Annotated[
+    float,
+    typer.Option(
+        help="Factor of the times of boxes, before that: 0.001 for milliseconds.",
+        rich_help_panel="What numbers mean",
+    ),
 ]
 ResultDirectory = Annotated[
     Path, typer.Option("--out", metavar="DIR", help="Directory of the results, created if needed.")
@@ -167,20 +224,56 @@ def given_reading(
     max_bad: float,
     nms: float | None,
     topics: list[str] | None,
-    camera_in_body: Path | None,
     image_size: str | None,
     camera_id: str | None = None,
+    *,
+    readings: "Readings",
 ) -> "ReadOptions":
     """Return how files are read from these options."""
     from dqslam import io
 
-    mount = None if camera_in_body is None else io.read_mount(camera_in_body)
     return io.ReadOptions(
         first_frame=first_frame,
         max_bad=max_bad,
         nms=nms,
         topics=tuple(topics or ()),
-        body_from_camera=None if mount is None else tuple(mount.tolist()),
         image_size=given_image_size(image_size),
         camera_id=camera_id,
+        readings=readings,
     )
+
+
+def given_readings(
+    *,
+    camera_in_body: Path | None,
+    poses: list[str] | None = None,
+    length_scale: float = 1.0,
+    box_form: str | None = None,
+    box_image: str | None = None,
+    letterbox: bool = False,
+    time_offset: float = 0.0,
+    time_scale: float = 1.0,
+) -> "Readings":
+    """Return what these options say that numbers mean."""
+    from dqslam import io
+
+    mount = None if camera_in_body is None else tuple(io.read_mount(camera_in_body).tolist())
+    return io.Readings(
+        poses=tuple(poses or ()),
+        body_from_camera=mount,
+        length_scale=length_scale,
+        boxes=io.BoxReading(form=box_form, image=_size(box_image), letterbox=letterbox),
+        time_scale=time_scale,
+        time_offset=time_offset,
+    )
+
+
+def _size(text: str | None) -> tuple[float, float] | None:
+    """Read a size like 640x480."""
+    if text is None:
+        return None
+    try:
+        width, height = (float(side) for side in text.lower().split("x"))
+    except ValueError:
+        raise ValueError(f"--box-image: {text!r} is not like 640x480") from None
+    return width, height

@@ -10,6 +10,8 @@ import typer
 from dqslam._input import refuse_shared_input
 from dqslam.cli.options import (
     AbsoluteFile,
+    BoxForm,
+    BoxImage,
     CameraFile,
     CameraId,
     CameraInBody,
@@ -20,15 +22,21 @@ from dqslam.cli.options import (
     FrameRate,
     FrameTimesFile,
     ImageSize,
+    LengthScale,
+    Letterbox,
     MaxBad,
     MaxTimeDifference,
     Nms,
     OdometryFile,
+    PosesAs,
     PositionsFile,
     ResultDirectory,
+    TimeOffset,
+    TimeScale,
     Topics,
     given_frame_times,
     given_reading,
+    given_readings,
 )
 from dqslam.cli.output import Json, Output, Quiet
 from dqslam.cli.run_tables import show_report
@@ -37,6 +45,7 @@ from dqslam.cli.settings import CONFIG, ConfigFile, settings_text
 if TYPE_CHECKING:
     from dqslam.assumptions import OdometryNoise
 
+DOUBTFUL = 3  # exit code of a run whose result is doubtful
 NOISE = "translation=0.02,rotation=0.01"
 
 
@@ -54,7 +63,6 @@ def run(
     frame_times: FrameTimesFile = None,
     frame_rate: FrameRate = None,
     first_frame: FirstFrame = None,
-    camera_in_body: CameraInBody = None,
     image_size: ImageSize = None,
     topics: Topics = None,
     nms: Nms = None,
@@ -130,6 +138,18 @@ def run(
         typer.Option("--online", help="Replay the recording step by step, and polish at the end."),
     ] = False,
     max_time_difference: MaxTimeDifference = None,
+    poses: PosesAs = None,
+    camera_in_body: CameraInBody = None,
+    length_scale: LengthScale = 1.0,
+    box_form: BoxForm = None,
+    box_image: BoxImage = None,
+    letterbox: Letterbox = False,
+    time_offset: TimeOffset = 0.0,
+    time_scale: TimeScale = 1.0,
+    force: Annotated[
+        bool,
+        typer.Option("--force", help="Go on if poses and boxes do not fit together."),
+    ] = False,
     config: ConfigFile = None,
     quiet: Quiet = False,
     json: Json = False,
@@ -137,7 +157,8 @@ def run(
     """Estimate the trajectory and the objects of a recording.
 
     Writes trajectory.txt, odometry.txt (the initial poses), map.json, boxes.csv, camera.json,
-    report.json and config.toml.
+    report.json and config.toml. Exits with 3 if the result is doubtful: poses and boxes do not fit
+    together, the map is empty, or most boxes show nothing in it.
     """
     from dqslam import _core, io
     from dqslam.assumptions import load_size_priors
@@ -152,6 +173,16 @@ def run(
         raise ValueError("--odometry-covariance: another option gives the noise already")
     if online and mode == "mapping":
         raise ValueError("--online: cannot be combined with --mode mapping")
+    readings = given_readings(
+        poses=poses,
+        camera_in_body=camera_in_body,
+        length_scale=length_scale,
+        box_form=box_form,
+        box_image=box_image,
+        letterbox=letterbox,
+        time_offset=time_offset,
+        time_scale=time_scale,
+    )
     options = RunFilesOptions(
         ids=ids,
         trust_ids=trust_ids,
@@ -168,11 +199,12 @@ def run(
             0.0 if strict else max_bad,
             nms,
             topics,
-            camera_in_body,
             image_size,
             camera_id,
+            readings=readings,
         ),
         max_time_difference=max_time_difference,
+        force=force,
         added_noise=added,
         odometry_noise=believed,
         odometry_covariance=odometry_covariance,
@@ -197,6 +229,8 @@ def run(
     output.document(result.report)
     show_report(output, result.report)
     output.line(f"wrote {out}")
+    if result.report["doubts"]:
+        raise typer.Exit(DOUBTFUL)
 
 
 def parse_noise(option: str, text: str | None) -> "OdometryNoise | None":

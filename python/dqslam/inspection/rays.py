@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dqslam import _core
+from dqslam.lens import ideal_pixels
 
 ITERATIONS = 5
 # Middles that are farther off than this lose their weight, as false boxes and moved objects [px].
@@ -37,6 +38,16 @@ def inverted(poses: NDArray[np.float64]) -> NDArray[np.float64]:
     return _core.inverse(_core.PoseModel.SE3, poses.reshape(-1, 7)).reshape(poses.shape)
 
 
+def at_depth_one(camera: _core.Camera, middle: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return middles (..., 2) px as recorded at depth 1.
+
+    Those beyond the range of the lens, which no right box has, are taken as they were recorded.
+    """
+    ideal = ideal_pixels(camera, middle) if camera.has_distortion else middle
+    ideal = np.where(np.isfinite(ideal), ideal, middle)
+    return np.asarray((ideal - [camera.cx, camera.cy]) / [camera.fx, camera.fy])
+
+
 def residuals(camera: _core.Camera, views: Views) -> NDArray[np.float64]:
     """Return the distance of each middle from the point of its track [px], shape (t, n).
 
@@ -46,8 +57,7 @@ def residuals(camera: _core.Camera, views: Views) -> NDArray[np.float64]:
 
     shape = views.there.shape
     focal = np.array([camera.fx, camera.fy])
-    ideal = camera.undistort_points(views.middle.reshape(-1, 2)).reshape(*shape, 2)
-    normalized = (ideal - [camera.cx, camera.cy]) / focal
+    normalized = at_depth_one(camera, views.middle)
     poses = views.world_from_camera
     turn = Rotation.from_quat(poses[..., 3:].reshape(-1, 4)).as_matrix().reshape(*shape, 3, 3)
     ray = np.einsum("tnij,tnj->tni", turn, np.dstack([normalized, np.ones(shape)]))

@@ -13,12 +13,17 @@ Ids = Literal["track_id", "class_id"]
 
 # Boxes of one class that overlap by this much in successive frames show one object.
 LEAST_OVERLAP = 0.5
+# Boxes of one class that overlap by this much in one image show one object.
+SAME_OVERLAP = 0.7
+MOST_ALIKE = 50  #: boxes of one class in an image that are compared with each other
 # A class with a single box in this share of its frames has one object.
 ALONE_SHARE = 0.95
 # The least number of boxes of a useful track, and the largest one that is used, to save time.
 FEWEST_VIEWS, MOST_VIEWS = 5, 40
 FEWEST_TRACKS, MOST_TRACKS = 3, 150
 LEAST_SCORE = 0.3
+# The most frames that are looked at, in this number of parts.
+MOST_FRAMES, PARTS = 2000, 20
 
 
 def find_tracks(table: DetectionTable, ids: Ids | None) -> list[NDArray[np.int64]]:
@@ -26,9 +31,11 @@ def find_tracks(table: DetectionTable, ids: Ids | None) -> list[NDArray[np.int64
 
     Without ``ids``, boxes are joined by their overlap. If that finds almost nothing, because images
     are far apart, boxes of a class with one object are joined. Of two boxes of an object in a frame
-    the one with the better score counts. Long tracks are thinned evenly.
+    the one with the better score counts. Of long recordings, parts are looked at.
     """
     rows = np.flatnonzero(table.score >= min(LEAST_SCORE, float(np.median(table.score))))
+    rows = rows[_in_parts(table.frame[rows])]
+    rows = rows[~doubles(table, rows)]
     if ids is not None:
         column = table.class_id if ids == "class_id" else table.track_id
         return [] if column is None else _grouped(table, rows, column[rows])
@@ -63,13 +70,33 @@ def overlap_ids(table: DetectionTable, rows: NDArray[np.int64]) -> NDArray[np.in
 
 def overlap(boxes: NDArray[np.float64], others: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return intersection over union of boxes (a, 4) with others (b, 4): shape (a, b)."""
-    low = np.maximum(boxes[:, None, :2], others[None, :, :2])
-    high = np.minimum(boxes[:, None, 2:], others[None, :, 2:])
-    both = np.prod(np.clip(high - low, 0, None), axis=2)
-    areas = [np.prod(box[:, 2:] - box[:, :2], axis=1) for box in (boxes, others)]
-    union = areas[0][:, None] + areas[1][None] - both
+    return _shared(boxes[:, None], others[None])
+
+
+def _shared(boxes: NDArray[np.float64], others: NDArray[np.float64]) -> NDArray[np.float64]:
+    low = np.maximum(boxes[..., :2], others[..., :2])
+    high = np.minimum(boxes[..., 2:], others[..., 2:])
+    both = np.prod(np.clip(high - low, 0, None), axis=-1)
+    areas = [np.prod(box[..., 2:] - box[..., :2], axis=-1) for box in (boxes, others)]
+    union = areas[0] + areas[1] - both
     shared: NDArray[np.float64] = both / np.where(union > 0, union, 1.0)
     return shared
+
+
+def doubles(table: DetectionTable, rows: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Tell which boxes (m,) show what a better box of their class in the same image shows."""
+    double = np.zeros(len(rows), dtype=np.bool_)
+    order = np.lexsort((-table.score[rows], table.class_id[rows], table.frame[rows]))
+    boxes = table.box[rows][order]
+    frame, number = table.frame[rows][order], table.class_id[rows][order]
+    for step in range(1, MOST_ALIKE):
+        same = (frame[step:] == frame[:-step]) & (number[step:] == number[:-step])
+        if not same.any():
+            break
+        later = np.flatnonzero(same) + step
+        shared = _shared(boxes[later], boxes[later - step])
+        double[order[later[shared >= SAME_OVERLAP]]] = True
+    return double
 
 
 def _lone_classes(table: DetectionTable, rows: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -97,10 +124,22 @@ def _grouped(
     rows, label = rows[keep], label[keep]
     groups = np.split(rows, np.flatnonzero(np.diff(label)) + 1)
     seen_often = sorted((group for group in groups if len(group) >= FEWEST_VIEWS), key=len)
-    return [_thinned(group) for group in seen_often[::-1][:MOST_TRACKS]]
+    return seen_often[::-1][:MOST_TRACKS]
 
 
-def _thinned(group: NDArray[np.int64]) -> NDArray[np.int64]:
+def _in_parts(frame: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Choose boxes (m,) of at most MOST_FRAMES frames: parts of successive ones, evenly spaced."""
+    frames = np.unique(frame)
+    if len(frames) <= MOST_FRAMES:
+        return np.ones(len(frame), dtype=np.bool_)
+    part = np.arange(len(frames)) * PARTS // len(frames)
+    start = np.searchsorted(part, np.arange(PARTS))
+    chosen = np.arange(len(frames)) - start[part] < MOST_FRAMES // PARTS
+    return np.asarray(chosen[np.searchsorted(frames, frame)])
+
+
+def thinned(group: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return at most MOST_VIEWS rows of a track (n,), evenly spaced."""
     if len(group) <= MOST_VIEWS:
         return group
     kept: NDArray[np.int64] = group[np.linspace(0, len(group) - 1, MOST_VIEWS).round().astype(int)]

@@ -35,6 +35,8 @@ from dqslam.io.reading import check_topics as check_topics
 from dqslam.io.reading import read_boxes_file as read_boxes_file
 from dqslam.io.reading import read_camera_file as read_camera_file
 from dqslam.io.reading import read_path_file as read_path_file
+from dqslam.io.readings import BoxReading as BoxReading
+from dqslam.io.readings import Readings as Readings
 from dqslam.io.recording import Dropped as Dropped
 from dqslam.io.recording import load_recording as load_recording
 from dqslam.io.results import BoxTable as BoxTable

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from dqslam._checks import Ints
 from dqslam.io.formats import guarded
 from dqslam.io.measurements import read_absolute, read_closures, read_positions
 from dqslam.recording import Recording
@@ -21,12 +22,15 @@ class Extras:
     closures: str | Path | None = None
     """Relative poses of the camera between any two poses."""
 
-    def added_to(self, recording: Recording, max_time_difference: float | None) -> Recording:
+    def added_to(
+        self, recording: Recording, max_time_difference: float | None, counted: Ints | None = None
+    ) -> Recording:
         """Return a recording with the measurements of the files.
 
-        ``max_time_difference`` is the most seconds from a measurement to its pose.
+        ``max_time_difference`` is the most seconds from a measurement to its pose, and ``counted``
+        (k,) are the rows of the poses that the files count, by default all.
         """
-        near = (recording.timestamps, max_time_difference)
+        near = (recording.timestamps, max_time_difference, counted)
         for name, path, read in (
             ("positions", self.positions, read_positions),
             ("absolute", self.absolute, read_absolute),

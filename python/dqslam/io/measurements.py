@@ -34,12 +34,16 @@ _UNIT = 1e-3
 
 
 def read_positions(
-    path: str | Path, timestamps: Floats, max_time_difference: float | None = None
+    path: str | Path,
+    timestamps: Floats,
+    max_time_difference: float | None = None,
+    counted: Ints | None = None,
 ) -> RelativePositions:
     """Read positions of objects in the camera frame at poses of these times (n,).
 
     ``max_time_difference`` is the most seconds from a measurement to its pose, by default half the
-    median interval of poses.
+    median interval of poses. ``counted`` (k,) are the rows of the poses that the column ``pose``
+    counts, by default all.
 
     Raises
     ------
@@ -50,7 +54,7 @@ def read_positions(
     object_id = table.integers("object")
     table.reject(object_id < 0, "object is {}, not an id", "object")
     return RelativePositions(
-        pose=_poses(table, "", timestamps, max_time_difference),
+        pose=_poses(table, "", timestamps, max_time_difference, counted),
         object_id=object_id,
         object_in_robot=_columns(table, POSITION),
         covariance=_covariances(table, 3, (("sigma", 3),)),
@@ -58,24 +62,30 @@ def read_positions(
 
 
 def read_absolute(
-    path: str | Path, timestamps: Floats, max_time_difference: float | None = None
+    path: str | Path,
+    timestamps: Floats,
+    max_time_difference: float | None = None,
+    counted: Ints | None = None,
 ) -> AbsolutePositions:
     """Read absolute positions of the camera; parameters and errors are those of read_positions."""
     table = read_csv(path, required=POSITION)
     return AbsolutePositions(
-        pose=_poses(table, "", timestamps, max_time_difference),
+        pose=_poses(table, "", timestamps, max_time_difference, counted),
         position=_columns(table, POSITION),
         covariance=_covariances(table, 3, (("sigma", 3),)),
     )
 
 
 def read_closures(
-    path: str | Path, timestamps: Floats, max_time_difference: float | None = None
+    path: str | Path,
+    timestamps: Floats,
+    max_time_difference: float | None = None,
+    counted: Ints | None = None,
 ) -> LoopClosures:
     """Read loop closures; parameters and errors are those of read_positions."""
     table = read_csv(path, required=(*POSITION, *QUATERNION))
-    from_pose = _poses(table, "from_", timestamps, max_time_difference)
-    to_pose = _poses(table, "to_", timestamps, max_time_difference)
+    from_pose = _poses(table, "from_", timestamps, max_time_difference, counted)
+    to_pose = _poses(table, "to_", timestamps, max_time_difference, counted)
     table.reject(from_pose == to_pose, "both ends are of the same pose")
     quaternion = _columns(table, QUATERNION)
     norm = np.linalg.norm(quaternion, axis=1)
@@ -86,7 +96,11 @@ def read_closures(
 
 
 def _poses(
-    table: CsvTable, prefix: str, timestamps: Floats, max_time_difference: float | None
+    table: CsvTable,
+    prefix: str,
+    timestamps: Floats,
+    max_time_difference: float | None,
+    counted: Ints | None,
 ) -> Ints:
     pose, time = f"{prefix}pose", f"{prefix}timestamp"
     if (pose in table) == (time in table):
@@ -95,10 +109,10 @@ def _poses(
         raise FileError(table.path, f"needs a column {pose} or {time}, has {which}", header)
     if pose in table:
         rows = table.integers(pose)
-        count = len(timestamps)
+        count = len(timestamps) if counted is None else len(counted)
         outside = (rows < 0) | (rows >= count)
         table.reject(outside, f"{pose} is {{}}, but there are {count} poses, from 0", pose)
-        return rows
+        return rows if counted is None else counted[rows]
     rows, late = nearest_pose(timestamps, table.numbers(time))
     tolerance = max_time_difference
     if tolerance is None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from dqslam import _core
@@ -14,6 +15,7 @@ from dqslam.io.detections.rosbag import KIND as DETECTION_ARRAY
 from dqslam.io.first_frame import with_first_frame
 from dqslam.io.frames import FrameTimes
 from dqslam.io.notes import MAX_BAD, Notes
+from dqslam.io.readings import AS_USUAL, Readings
 from dqslam.io.sources import FormatNames, topic_of
 from dqslam.io.trajectory import Trajectory, read_trajectory
 from dqslam.io.trajectory.rosbag import KINDS as TRAJECTORIES
@@ -33,12 +35,12 @@ class ReadOptions:
     whatever their class; None leaves all."""
     topics: tuple[str, ...] = ()
     """Topics, for bags that have several of a kind."""
-    body_from_camera: tuple[float, ...] | None = None
-    """Pose of the camera in the body of the trajectory, m and x y z w; None is the camera's own."""
     image_size: tuple[int, int] | None = None
     """Width and height of the image in px, for a camera file that has none."""
     camera_id: str | None = None
     """Id of the camera, in a file with several."""
+    readings: Readings = AS_USUAL
+    """What numbers in the files mean, where it is not what is usual."""
 
     def __post_init__(self) -> None:
         """Check the topics."""
@@ -64,15 +66,16 @@ def read_path_file(
     options: ReadOptions,
     notes: Notes,
 ) -> Trajectory:
-    """Read the trajectory of a recording."""
-    return read_trajectory(
+    """Read the trajectory of the camera of a recording, in meters."""
+    trajectory = read_trajectory(
         path,
         formats.trajectory,
         frames=frames,
-        body_from_camera=options.body_from_camera,
+        has_mount=options.readings.body_from_camera is not None,
         topic=topic_of(path, TRAJECTORIES, options.topics),
         notes=notes,
     )
+    return options.readings.trajectory(trajectory)
 
 
 def read_boxes_file(
@@ -89,8 +92,10 @@ def read_boxes_file(
 ) -> DetectionTable:
     """Read the boxes of a recording, whose frames may be those of the trajectory.
 
-    Without ``check`` they are as in the file, for a search for mistakes.
+    They are read as they are meant before they are checked and cut. Without ``check`` they are not,
+    for a search for mistakes.
     """
+    readings, size = options.readings, (camera.width, camera.height)
     table = read_detections(
         path,
         formats.detections,
@@ -99,12 +104,14 @@ def read_boxes_file(
         frames=frames,
         first_frame=options.first_frame,
         check=check,
+        reread=partial(readings.boxes.read, size=size) if readings.changes_boxes else None,
         min_score=min_score,
         nms=options.nms,
         topic=topic_of(path, (DETECTION_ARRAY,), options.topics),
         notes=notes,
     )
-    return with_first_frame(table, trajectory.timestamps, frames, notes)
+    table = with_first_frame(table, trajectory.timestamps, frames, notes)
+    return readings.timed(table)
 
 
 def check_topics(

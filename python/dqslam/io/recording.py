@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -9,6 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from dqslam import _core
 from dqslam.assumptions import OdometryNoise
 from dqslam.io.detections import DetectionTable
 from dqslam.io.extras import Extras
@@ -25,11 +27,18 @@ from dqslam.io.reading import (
 )
 from dqslam.io.sources import FormatNames
 from dqslam.io.step_covariances import read_step_covariances
+from dqslam.io.trajectory import Trajectory
 from dqslam.lens import undistorted_or_nan
 from dqslam.recording import Detections, Odometry, Recording
+from dqslam.recording.interpolation import split_steps
 
 # With two boxes and a noisy path, the distance of an object cannot be separated from its size.
 FEWEST_BOXES = 3
+
+# An image this much of an interval from a pose has its own pose, except in longer intervals than so
+# many usual ones.
+NEAR_SHARE, LONGEST_INTERVAL = 0.05, 2.5
+ROUNDING = 1e-6
 
 Ids = Literal["none", "track_id", "class_id"]
 
@@ -69,6 +78,8 @@ def load_recording(
     reading: ReadOptions | None = None,
     notes: Notes | None = None,
     extras: Extras | None = None,
+    interpolate: bool = True,
+    examine: Callable[[_core.Camera, Trajectory, DetectionTable], None] | None = None,
 ) -> tuple[Recording, Dropped]:
     """Read a recording in SE(3), where the robot is the camera, and the numbers of dropped boxes.
 
@@ -87,8 +98,8 @@ def load_recording(
         the worse one of two boxes with the same id in an image, and those whose id has fewer than 3
         boxes.
     max_time_difference
-        A box belongs to the nearest pose in time, if that is within this number of seconds. The
-        default is half the median interval between poses.
+        The most seconds from a box to the nearest pose in time; by default half the median interval
+        between poses.
     odometry_noise
         The uncertainty of each step, because trajectory files have none.
     odometry_covariance
@@ -99,12 +110,20 @@ def load_recording(
     frames
         Times of the frames, for files that only number them: see ``choose_frame_times``.
     reading
-        How the files are read beside that, by default ``ReadOptions()``.
+        How the files are read beside that, and what numbers in them mean, by default
+        ``ReadOptions()``.
     notes
         Collects what is left out of the files and what is doubtful in them; by default these are
         warnings of Python, of the category ``InputWarning``.
     extras
         Files of other measurements: see ``io.measurements``.
+    interpolate
+        Whether images between two poses get poses of their own, at constant velocity, and those
+        before the first and after the last pose are left out. If not, a box belongs to the nearest
+        pose.
+    examine
+        Called with camera, trajectory and boxes before they become a recording; what it raises
+        ends that.
 
     Raises
     ------
@@ -137,36 +156,44 @@ def load_recording(
     check_topics(camera, odometry, detections, how)
     lens = read_camera_file(camera, names, how)
     trajectory = read_path_file(odometry, names, frames, how, own)
-    times, path = trajectory
-    if len(times) < 2:
+    pose_times, path = trajectory
+    if len(pose_times) < 2:
         raise FileError(odometry, "one pose only: nothing moves")
     table = read_boxes_file(
         detections, lens, trajectory, names, frames, how, own, min_score=min_score
     )
     if notes is None:
         own.warn()
+    if examine is not None:
+        examine(lens, trajectory, table)
     object_id = _object_ids(table, ids)
-    pose, late = nearest_pose(times, table.timestamp)
-    tolerance = 0.5 * float(np.median(np.diff(times)))
-    if max_time_difference is not None:
-        tolerance = max_time_difference
+    covariance = (odometry_noise or OdometryNoise()).covariance(len(path) - 1)
+    if odometry_covariance is not None:
+        covariance = read_step_covariances(odometry_covariance, pose_times)
+    steps, times = Odometry.from_poses(path, covariance=covariance), pose_times
+    _, late = nearest_pose(times, table.timestamp)
+    half = 0.5 * float(np.median(np.diff(times)))
+    tolerance = half * (1 + ROUNDING) if max_time_difference is None else max_time_difference
+    if interpolate:
+        outside = (table.timestamp < times[0]) | (table.timestamp > times[-1])
+        late[outside & (late > 2 * NEAR_SHARE * half)] = np.inf
+        steps, times = split_steps(steps, times, _between_poses(table.timestamp, late, times))
+    pose, apart = nearest_pose(times, table.timestamp)
+    apart = np.where(late <= tolerance, apart, np.inf)
     box = undistorted_or_nan(lens, table.box) if lens.has_distortion else table.box
     final = final_ids and ids != "none"
     rows, dropped = (_select if final else _select_images)(
-        table, object_id, pose, late, _scored(table, box, min_score), tolerance
+        table, object_id, pose, apart, _scored(table, box, min_score), tolerance
     )
     beyond = int(np.sum((table.score >= min_score) & ~np.isfinite(box).all(axis=1)))
     dropped = replace(dropped, beyond_lens=beyond, below_min_score=dropped.below_min_score - beyond)
     if not rows.size:
         raise FileError(detections, _nothing_left(table, dropped, ids, tolerance, times))
-    covariance = (odometry_noise or OdometryNoise()).covariance(len(path) - 1)
-    if odometry_covariance is not None:
-        covariance = read_step_covariances(odometry_covariance, times)
     classes = dict(zip(table.class_id.tolist(), table.class_name, strict=True))
     recording = Recording(
         camera=lens,
         timestamps=times,
-        odometry=Odometry.from_poses(path, covariance=covariance),
+        odometry=steps,
         detections=Detections(
             pose=pose[rows],
             box=box[rows],
@@ -176,12 +203,24 @@ def load_recording(
             class_names={number: name or str(number) for number, name in classes.items()},
         ),
     )
-    return (extras or Extras()).added_to(recording, max_time_difference), dropped
+    in_file = np.searchsorted(times, pose_times)
+    return (extras or Extras()).added_to(recording, tolerance, in_file), dropped
 
 
 def _scored(table: DetectionTable, box: NDArray[np.float64], min_score: float) -> NDArray[np.bool_]:
     """Tell which boxes have the least score and are not beyond the lens, shape (m,)."""
     return np.asarray((table.score >= min_score) & np.isfinite(box).all(axis=1))
+
+
+def _between_poses(
+    times: NDArray[np.float64], late: NDArray[np.float64], pose_times: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the times (k,) of boxes, of all (m,), that are too far from the nearest pose."""
+    before = np.clip(np.searchsorted(pose_times, times) - 1, 0, len(pose_times) - 2)
+    interval = pose_times[before + 1] - pose_times[before]
+    # In a gap of the odometry, its velocity is not known.
+    usual = interval <= LONGEST_INTERVAL * float(np.median(np.diff(pose_times)))
+    return np.unique(times[usual & (late > NEAR_SHARE * interval)])
 
 
 def _object_ids(table: DetectionTable, ids: Ids) -> NDArray[np.int64]:

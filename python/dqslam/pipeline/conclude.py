@@ -114,12 +114,14 @@ def conclude(
     overlap, tested_id = overlap_with_map(estimate, tested)
     if tests_held_out:
         object_id[held_out] = tested_id
+    doubts = warn_of_boxes(len(output.object_id), int(mapped.sum()))
     report = {
         "warnings": [
             *output.remarks,
-            *warn_of_boxes(len(output.object_id), int(mapped.sum())),
+            *doubts,
             *warn_of_calibration(output.calibration),
         ],
+        "doubts": doubts,
         "mode": options.mode.name.lower(),
         "poses": len(estimate.timestamps),
         "keyframes": output.keyframes,

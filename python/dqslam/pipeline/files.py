@@ -11,6 +11,7 @@ from typing import Any
 from dqslam import _core, io
 from dqslam._files import results_directory, uninterrupted, write_text
 from dqslam.association import FINAL
+from dqslam.inspection import FATAL, first_findings
 from dqslam.pipeline.conclude import RunResult
 from dqslam.pipeline.options import Progress, RunFilesOptions
 from dqslam.pipeline.recording import run
@@ -55,8 +56,9 @@ def run_files(
     Raises
     ------
     ValueError
-        For what ``run`` refuses, and for what is wrong in a file: ``io.FileError`` names the file
-        and the line. No directory is left then that was made for the results.
+        For files that do not fit together, unless forced; for what ``run`` refuses; and for what is
+        wrong in a file: ``io.FileError`` names the file and the line. No directory is left then
+        that was made for the results.
 
     Examples
     --------
@@ -78,12 +80,17 @@ def run_files(
     if groundtruth is not None:
         reference, reference_name = io.read_trajectory(groundtruth, repeated_times=True), "file"
     elif options.added_noise is not None:
-        reference = io.read_trajectory(odometry, options.formats.trajectory, frames=options.frames)
+        quiet = io.Notes(max_bad=options.reading.max_bad)  # the same are said of the recording
+        reference = io.read_path_file(
+            odometry, options.formats, options.frames, options.reading, quiet
+        )
         reference_name = "odometry before the added noise"
     says_noise = bool(options.believed_noise or options.odometry_covariance)
     with nullcontext() if out is None else results_directory(Path(out)):
         notes = io.Notes(max_bad=options.reading.max_bad)
-        recording, dropped = _load((camera, odometry, detections), options, notes)
+        doubts: list[str] = []
+        remarks: list[str] = []
+        recording, dropped = _load((camera, odometry, detections), options, notes, doubts, remarks)
         result = run(
             recording,
             replace(options, estimates_noise=options.estimates_noise or not says_noise),
@@ -102,7 +109,8 @@ def run_files(
             "reference": reference_name,
             **result.report,
         }
-        report["warnings"] = notes.sentences() + report["warnings"]
+        report["warnings"] = notes.sentences() + doubts + remarks + report["warnings"]
+        report["doubts"] = doubts + report["doubts"]
         result = replace(result, report=report)
         if out is not None:
             _save(result, Path(out), beside or {})
@@ -119,9 +127,23 @@ def _check_extras(options: RunFilesOptions) -> None:
 
 
 def _load(
-    files: Sequence[str | Path], options: RunFilesOptions, notes: io.Notes
+    files: Sequence[str | Path],
+    options: RunFilesOptions,
+    notes: io.Notes,
+    doubts: list[str],
+    remarks: list[str],
 ) -> tuple[Recording, io.Dropped]:
-    """Read a recording, add noise to it if need be, and count the boxes that were left out."""
+    """Read a recording, add noise to it if need be, and count the boxes that were left out.
+
+    What readers left out is added to ``notes``, what speaks against the files to ``doubts``, or
+    refused, and what may to ``remarks``.
+    """
+
+    def examine(camera: _core.Camera, trajectory: io.Trajectory, table: io.DetectionTable) -> None:
+        found, noted = _examine(camera, trajectory, table, options)
+        doubts.extend(found)
+        remarks.extend(noted)
+
     recording, dropped = io.load_recording(
         *files,
         min_score=options.min_score,
@@ -135,12 +157,37 @@ def _load(
         reading=options.reading,
         notes=notes,
         extras=options.extras,
+        # Noise is added to every step: steps are then those of the file.
+        interpolate=options.added_noise is None,
+        examine=examine,
     )
     if options.added_noise is not None:
         noisy = perturb_odometry(recording, options.added_noise, seed=options.seed).odometry
         noisy = replace(noisy, covariance=recording.odometry.covariance)
         recording = replace(recording, odometry=noisy)
     return recording, dropped
+
+
+def _examine(
+    camera: _core.Camera,
+    trajectory: io.Trajectory,
+    table: io.DetectionTable,
+    options: RunFilesOptions,
+) -> tuple[list[str], tuple[str, ...]]:
+    """Return what speaks against the files, and notes; refuse what makes no map, unless forced."""
+    if len(trajectory.timestamps) < 2:
+        return [], ()  # refused later
+    ids = None if options.ids == "none" or options.trust_ids != FINAL else options.ids
+    findings, notes = first_findings(
+        camera, trajectory, table, ids=ids, max_time_difference=options.max_time_difference
+    )
+    fatal = [str(finding) for finding in findings if finding.check in FATAL]
+    if fatal and not options.force:
+        raise ValueError(
+            f"the files do not fit together: {'; '.join(fatal)}. `dqslam inspect` tells more, "
+            "--force goes on"
+        )
+    return [str(finding) for finding in findings], notes
 
 
 def _describe(options: RunFilesOptions) -> dict[str, Any]:

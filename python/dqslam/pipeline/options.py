@@ -61,9 +61,11 @@ class RunFilesOptions(RunOptions):
     """Times of frames, for files that only count them; None takes their numbers for seconds where
     the trajectory counts frames, too."""
     reading: ReadOptions = ReadOptions()
-    """How the files are read beside that: bad records, the first frame, topics, mount, camera."""
+    """How the files are read beside that: bad records, topics, what numbers mean, ..."""
     max_time_difference: float | None = None
     """Seconds from a box to its pose; None is half the median interval between poses."""
+    force: bool = False
+    """Whether to go on if poses and boxes do not fit together, or would in another reading."""
     added_noise: OdometryNoise | None = None
     """Noise to add to every step of the odometry, drawn with ``seed``."""
     odometry_noise: OdometryNoise | None = None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from dqslam._input import plain_name
@@ -49,6 +50,7 @@ def read_detections(
     classes: dict[int, str] | None = None,
     cut: bool = True,
     check: bool = True,
+    reread: Callable[[DetectionTable], DetectionTable] | None = None,
     min_score: float = 0.0,
     nms: float | None = None,
     topic: str | None = None,
@@ -78,6 +80,9 @@ def read_detections(
         Whether to find inverted boxes, scores outside of 0 to 1, and times that do not
         increase. Without it the table has the content of the file, for a search for mistakes, and
         what would be left out is only noted.
+    reread
+        Called with the boxes as the format has them, before they are checked and cut; returns the
+        boxes that are meant.
     min_score
         Boxes with a lower score, 0 to 1, do not count: they stay, whatever else is wrong with them.
     nms
@@ -111,7 +116,7 @@ def read_detections(
         notes=own,
     )
     table: DetectionTable = guarded(path, chosen.name, chosen.read, path, context)
-    good = table
+    good = table = table if reread is None else reread(table)
     try:
         good = checked(table, width=width, height=height, cut=cut, min_score=min_score, notes=own)
     except FileError:

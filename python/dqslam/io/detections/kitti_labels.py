@@ -92,7 +92,7 @@ def _table(
 
     scored = {len(row) for row in rows} == {SCORE + 1}
     records = Records(
-        columns=TRACKING if files is None else TRACKING[2:],
+        columns=(*(TRACKING if files is None else TRACKING[2:]), *EDGES),
         line=places,
         box=np.column_stack([numbers(edge, BOX + i) for i, edge in enumerate(EDGES)]),
         frame=(

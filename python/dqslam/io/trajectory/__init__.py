@@ -32,6 +32,7 @@ def read_trajectory(
     *,
     frames: FrameTimes | None = None,
     body_from_camera: ArrayLike | None = None,
+    has_mount: bool = False,
     repeated_times: bool = False,
     topic: str | None = None,
     progress: Progress = no_progress,
@@ -49,6 +50,8 @@ def read_trajectory(
         Times of the frames, for a format that has none.
     body_from_camera
         Pose (7,) of the camera in the body, m and x y z w, for the trajectory of a body.
+    has_mount
+        Whether the caller knows that pose instead, and applies it.
     repeated_times
         Whether to leave out any repeated time instead of refusing it. Motion capture at a high rate
         has a few, because times are rounded.
@@ -74,7 +77,7 @@ def read_trajectory(
         topic=topic,
         progress=progress,
         notes=own,
-        has_mount=body_from_camera is not None,
+        has_mount=has_mount or body_from_camera is not None,
     )
     trajectory: Trajectory = guarded(path, chosen.name, chosen.read, path, context)
     if notes is None:

@@ -1,0 +1,239 @@
+"""The offset between the clocks of poses and boxes, from how boxes move between two views.
+
+Each step of odometry has noise of its own, and boxes that are compared with the steps of another
+time miss more. The sum of the misses of all steps is least at the offset of the clocks.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dqslam.inspection.comparison import WindowViews
+from dqslam.inspection.evidence import Evidence, Finding, Floats, NotEnoughDataError
+from dqslam.inspection.windows import FEWEST_STEPS, MOST_WINDOWS, Windows, find_windows
+from dqslam.recording.interpolation import interpolate_poses
+
+# Offsets that are tried: steps to each side.
+STEPS, FEW_STEPS = 12, 4
+# An offset is sure if boxes miss less by this number of standard deviations, and if it is so many
+# of its own from zero. Smaller motions within it are no mistake [px].
+SURE_GAIN, SURE_OFFSET, LEAST_MOTION_PX = 2.0, 3.5, 2.5
+# Beyond this share of the range, a path that repeats itself may fit as well.
+WITHIN = 0.75
+FEWEST_PARTS = 8
+RESAMPLES = 200
+SURE_DRIFT = 4.0
+# The least steps of the camera that are compared.
+FEWEST_COMPARED = 60
+MOST_CLOCK_WINDOWS = 5 * MOST_WINDOWS
+
+
+@dataclass(frozen=True)
+class ClockOffset:
+    """How much later than their times boxes were taken, by the clock of the poses."""
+
+    seconds: float
+    """Boxes fit best if this is added to their times."""
+    sigma: float
+    """Standard deviation of it; infinite where the least miss is at the end of the range."""
+    gain_sigmas: float
+    """By how many standard deviations boxes miss less then."""
+    motion_px: float
+    """Median motion of the middles of boxes in that time."""
+    drift: float
+    """How much it grows in a second."""
+    drift_sigma: float
+    """Standard deviation of it; infinite if it is not known."""
+
+    @property
+    def sure(self) -> bool:
+        """Whether boxes do fit better, and by more than what noise does."""
+        return (
+            self.gain_sigmas >= SURE_GAIN
+            and abs(self.seconds) >= SURE_OFFSET * self.sigma
+            and self.motion_px >= LEAST_MOTION_PX
+        )
+
+    @property
+    def drifts(self) -> bool:
+        """Whether the offset surely changes."""
+        return abs(self.drift) >= SURE_DRIFT * self.drift_sigma
+
+
+def estimate_clock_offset(
+    evidence: Evidence, *, steps: int = STEPS, most: int = MOST_CLOCK_WINDOWS
+) -> ClockOffset:
+    """Find the offset of the clocks at which boxes move most like the poses say.
+
+    It is looked for within a number of steps, intervals of poses or half those of images, in at
+    most so many windows of a length.
+
+    Raises
+    ------
+    NotEnoughDataError
+        If too few boxes move from view to view.
+    """
+    views = _views(evidence, most)
+    step = _step(evidence)
+    offsets = step * np.arange(-steps, steps + 1, dtype=float)
+    costs, when = _costs(evidence, views, offsets)
+    total = costs.sum(axis=0)
+    best, inside = _least(total)
+    spread = _spread(costs)
+    count = len(costs)
+    gains = costs[:, steps] - costs[:, int(np.clip(round(best), 0, 2 * steps))]
+    noise = float(gains.std(ddof=1)) / np.sqrt(count)
+    seconds = step * (best - steps)
+    drift, drift_sigma = _drift(costs, when)
+    return ClockOffset(
+        seconds=seconds,
+        sigma=step * max(spread, 0.05)
+        if inside and abs(best - steps) <= WITHIN * steps
+        else np.inf,
+        gain_sigmas=float(gains.mean()) / max(noise, 1e-12),
+        motion_px=abs(seconds) * _speed(evidence, views),
+        drift=step * drift,
+        drift_sigma=step * drift_sigma,
+    )
+
+
+def check_clock_shortly(evidence: Evidence) -> Finding | None:
+    """Check whether boxes fit better at times nearby, with few windows."""
+    return _judge(evidence, estimate_clock_offset(evidence, steps=FEW_STEPS, most=MOST_WINDOWS))
+
+
+def check_clock(evidence: Evidence) -> Finding | None:
+    """Check whether boxes fit better at other times: an offset, or another rate of the clock."""
+    return _judge(evidence, estimate_clock_offset(evidence))
+
+
+def _judge(evidence: Evidence, clock: ClockOffset) -> Finding | None:
+    if clock.drifts:
+        scale = 1 + clock.drift
+        return Finding(
+            "clock",
+            f"the clocks drift apart by {1e3 * clock.drift:.3g} ± {1e3 * clock.drift_sigma:.2g} ms "
+            f"a second: --time-scale {scale:.5g}, or another rate of frames",
+        )
+    if not clock.sure:
+        return None
+    interval = float(np.median(np.diff(np.unique(evidence.table.timestamp))))
+    return Finding(
+        "clock",
+        f"boxes fit best {abs(clock.seconds):.3g} ± {clock.sigma:.2g} s "
+        f"{'later' if clock.seconds > 0 else 'earlier'} than their times say, that is "
+        f"{abs(clock.seconds) / interval:.2g} images: --time-offset {clock.seconds:.3g}",
+    )
+
+
+def _views(evidence: Evidence, most: int) -> WindowViews:
+    middle = (evidence.table.box[:, :2] + evidence.table.box[:, 2:]) / 2
+    time = evidence.table.timestamp
+    windows = find_windows(evidence.tracks(), middle, time, most=most)
+    moving = windows.length < 2
+    windows = Windows(
+        windows.rows[moving], windows.there[moving], windows.length[moving], windows.part[moving]
+    )
+    if np.sum(windows.there[:, 1:]) < FEWEST_STEPS or len(np.unique(windows.part)) < FEWEST_PARTS:
+        raise NotEnoughDataError("too few boxes move from view to view")
+    poses = interpolate_poses(*evidence.trajectory, time[windows.rows])
+    return WindowViews(evidence.camera, windows, poses, middle[windows.rows])
+
+
+def _step(evidence: Evidence) -> float:
+    """Return a multiple of the interval of poses of at least half the interval of images [s].
+
+    Between two poses, half of the noise of both steps is left: only offsets by whole intervals have
+    the same noise.
+    """
+    interval = float(np.median(np.diff(evidence.trajectory.timestamps)))
+    images = np.diff(np.unique(evidence.table.timestamp))
+    return interval * max(1, round(0.5 * float(np.median(images)) / interval))
+
+
+def _costs(evidence: Evidence, views: WindowViews, offsets: Floats) -> tuple[Floats, Floats]:
+    """Return the robust sum of misses in each part of the time, at each offset: (parts, k).
+
+    The middles of the parts in time are returned, too: (parts,) s.
+    """
+    windows = views.windows
+    rows, there = windows.rows, windows.there
+    time = evidence.table.timestamp[rows]
+    inside = (time + offsets[0] >= evidence.trajectory.timestamps[0]) & (
+        time + offsets[-1] <= evidence.trajectory.timestamps[-1]
+    )
+    known = there & inside
+    pair = known[:, :-1] & known[:, 1:] & (rows[:, :-1] != rows[:, 1:])
+    whole = np.all(inside | ~there, axis=1)  # at each offset, the same windows
+    pair &= whole[:, None]
+    frame = evidence.table.frame[rows]
+    # Boxes of one step of the camera miss together: their mean counts.
+    _, group = np.unique(
+        np.stack([frame[:, :-1][pair], frame[:, 1:][pair]]), axis=1, return_inverse=True
+    )
+    group = group.reshape(-1)
+    if group.size == 0 or group.max() + 1 < FEWEST_COMPARED:
+        raise NotEnoughDataError("too few boxes move from view to view")
+    number = np.bincount(group)
+    part = np.zeros(len(number), dtype=np.int64)
+    part[group] = np.broadcast_to(windows.part[:, None], pair.shape)[pair]
+    misses = []
+    for offset in offsets:
+        poses = interpolate_poses(*evidence.trajectory, time + offset)
+        moved = WindowViews(views.camera, windows, poses, views.middle)
+        change = np.nan_to_num(np.diff(moved.fit().error, axis=1), nan=1.0)[pair]
+        mean = [np.bincount(group, change[:, axis]) / number for axis in (0, 1)]
+        misses.append(number * (mean[0] ** 2 + mean[1] ** 2))
+    squares = np.array(misses).T
+    scale = float(np.median(squares.min(axis=1))) * 2 + 1e-18
+    costs = np.log1p(squares / scale)
+    parts = np.unique(part)
+    begin = np.zeros(len(number))
+    begin[group] = time[:, :-1][pair]
+    return (
+        np.array([costs[part == one].sum(axis=0) for one in parts]),
+        np.array([np.median(begin[part == one]) for one in parts]),
+    )
+
+
+def _drift(costs: Floats, when: Floats) -> tuple[float, float]:
+    """Return the change of the best offset in a second, in steps, and its standard deviation."""
+    thirds = np.array_split(np.arange(len(costs)), 3)
+    found, spreads = [], []
+    for rows in thirds:
+        best, inside = _least(costs[rows].sum(axis=0))
+        spread = _spread(costs[rows])
+        found.append(best)
+        spreads.append(max(spread, 0.1) if inside else np.inf)
+    time = float(when[thirds[2]].mean() - when[thirds[0]].mean())
+    between = min(found[0], found[2]) - 1 <= found[1] <= max(found[0], found[2]) + 1
+    sigma = float(np.hypot(spreads[0], spreads[2])) if between else np.inf
+    return (found[2] - found[0]) / time, sigma / time
+
+
+def _spread(costs: Floats) -> float:
+    """Return the standard deviation of the least, if other parts of the time had been seen."""
+    random = np.random.default_rng(0)
+    drawn = random.multinomial(len(costs), np.full(len(costs), 1 / len(costs)), RESAMPLES)
+    return float(np.std([_least(total)[0] for total in drawn @ costs]))
+
+
+def _least(costs: Floats) -> tuple[float, bool]:
+    """Return where costs (k,) are least, between the entries, and whether that is inside."""
+    row = int(np.argmin(costs))
+    if row in (0, len(costs) - 1):
+        return float(row), False
+    before, here, after = costs[row - 1 : row + 2]
+    bend = before - 2 * here + after
+    return row + (0.5 * (before - after) / bend if bend > 0 else 0.0), True
+
+
+def _speed(evidence: Evidence, views: WindowViews) -> float:
+    """Return the median speed of the middles of boxes [px/s]."""
+    rows, there = views.windows.rows, views.windows.there
+    moved = np.linalg.norm(np.diff(views.middle, axis=1), axis=2)
+    seconds = np.diff(evidence.table.timestamp[rows], axis=1)
+    real = there[:, 1:] & (seconds > 0)
+    return float(np.median(moved[real] / seconds[real]))

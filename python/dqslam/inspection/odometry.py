@@ -1,0 +1,90 @@
+"""What is odd about the poses themselves, or about boxes, whatever explains them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dqslam.inspection.evidence import Evidence, Finding, NotEnoughDataError
+from dqslam.inspection.pose_checks import NOISY
+from dqslam.inspection.tracks import doubles
+from dqslam.inspection.windows import LENGTHS
+
+# Objects of which half are larger or smaller have lengths of another unit [m].
+LARGEST_M, SMALLEST_M = 20.0, 5e-4
+UNITS = {"millimeters": 1e-3, "centimeters": 1e-2, "kilometers": 1e3}
+USUAL_M = (0.01, 10.0)
+# A step is a jump if it is so many times as long, or as fast, as nine tenths of all steps.
+JUMP, FAST = 6.0, 4.0
+GAP = 3.0  #: median intervals that make a gap
+# The share of boxes that repeat another one.
+MOST_DOUBLES = 0.1
+
+
+def check_units(evidence: Evidence) -> Finding | None:
+    """Check whether objects have sizes of objects, if lengths are meters."""
+    views = evidence.windows()
+    if views.given.unexplained > NOISY:
+        raise NotEnoughDataError("the poses do not explain the boxes")
+    fit = views.fit()
+    rows, there = views.windows.rows, views.windows.there & (views.windows.length > 0)[:, None]
+    if not there.any():
+        there = views.windows.there
+    box = evidence.table.box[rows]
+    side = np.sqrt(np.prod(np.abs(box[..., 2:] - box[..., :2]), axis=-1)) / evidence.camera.fx
+    size = (side * fit.depth)[there & np.isfinite(fit.depth) & (fit.depth > 0)]
+    if size.size < len(LENGTHS):
+        raise NotEnoughDataError("no object has a known distance")
+    usual = float(np.median(size))
+    if SMALLEST_M <= usual <= LARGEST_M:
+        return None
+    length = np.sum(
+        np.linalg.norm(np.diff(evidence.trajectory.world_from_camera[:, :3], axis=0), axis=1)
+    )
+    likely = [
+        f"{unit} (--length-scale {meters:g})"
+        for unit, meters in UNITS.items()
+        if USUAL_M[0] <= usual * meters <= USUAL_M[1]
+    ]
+    meant = f": they may be {' or '.join(likely)}" if likely else ""
+    return Finding(
+        "units",
+        f"objects would be {usual:.3g} m large, and the path {length:.3g} m long, if the positions "
+        f"of the poses were meters{meant}",
+    )
+
+
+def check_doubles(evidence: Evidence) -> Finding | None:
+    """Check whether objects have several boxes in one image."""
+    table = evidence.table
+    double = float(np.mean(doubles(table, np.arange(len(table)))))
+    if double < MOST_DOUBLES:
+        return None
+    return Finding(
+        "doubles",
+        f"{double:.0%} of the boxes overlap another one of their class in the same image: was "
+        "non-maximum suppression left out? Each object needs one box an image",
+    )
+
+
+def note_jumps(evidence: Evidence) -> list[str]:
+    """Say where the odometry jumps, or has a gap that it crosses in one step."""
+    times, poses = evidence.trajectory
+    if len(times) < 10:
+        return []
+    steps = np.linalg.norm(np.diff(poses[:, :3], axis=0), axis=1)
+    seconds = np.diff(times)
+    usual, fast = np.quantile(steps, 0.9), np.quantile(steps / seconds, 0.9)
+    jumps = (steps > JUMP * usual) & (steps / seconds > FAST * fast)
+    gaps = (seconds > GAP * np.median(seconds)) & (steps > GAP * usual) & ~jumps
+    notes = []
+    for found, what in ((jumps, "jumps"), (gaps, "has a gap")):
+        rows = np.flatnonzero(found)
+        if rows.size:
+            row = int(rows[np.argmax(steps[rows])])
+            notes.append(
+                f"the odometry {what} {rows.size} time{'s' if rows.size > 1 else ''}: at "
+                f"{times[row]:.6g} s it moves by {steps[row]:.3g} m in {seconds[row]:.3g} s, "
+                f"usually by {usual:.2g} m at most. If it was lost there, "
+                "--odometry-covariance says how uncertain that step is"
+            )
+    return notes
