@@ -1,5 +1,7 @@
 """Association: which boxes show the same object."""
 
+from dqslam.association.all_images import FinalEstimate as FinalEstimate
+from dqslam.association.all_images import estimate_all_images as estimate_all_images
 from dqslam.association.association import FINAL as FINAL
 from dqslam.association.association import UNSURE as UNSURE
 from dqslam.association.association import Association as Association
