@@ -10,5 +10,6 @@ from dqslam.association.association import not_found as not_found
 from dqslam.association.gating import CHI2_GATE as CHI2_GATE
 from dqslam.association.rays import cameras_by_odometry as cameras_by_odometry
 from dqslam.association.rays import cast_rays as cast_rays
+from dqslam.association.repetition import RepeatedNoise as RepeatedNoise
 from dqslam.association.thinning import fill_in as fill_in
 from dqslam.association.tracklets import link_tracklets as link_tracklets

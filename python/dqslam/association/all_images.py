@@ -14,20 +14,23 @@ import numpy as np
 from dqslam import _core
 from dqslam._checks import Floats, Ints
 from dqslam.association.correlated import CorrelatedProblem
+from dqslam.association.earning import earns_it, gain_over_odometry, map_along_odometry
 from dqslam.association.noise import StepNoise
 from dqslam.association.repetition import RepeatedNoise
 from dqslam.association.scene_map import SceneMap
 from dqslam.association.thinning import bend_path, thin_recording
 from dqslam.association.variances import Levels, estimate_with_levels
+from dqslam.assumptions import BoxNoise
 from dqslam.graph import Graph, build_graph
 from dqslam.recording import Recording
 
-# The correlated problem is dense: so many images at most have all their boxes in it, else the
-# keyframes have; and with more keyframes than this, it is left to them to be independent.
-MOST_IMAGES, MOST_KEYFRAMES = 200, 400
+# The correlated problem is dense: so many images at most have their boxes in it, else the keyframes
+# have, or every other of them; with yet more keyframes, they are left to be independent.
+MOST_IMAGES = 150
+# Where keyframes are left out, an object keeps all of its own if it would have fewer.
+ENOUGH_VIEWS = 6
 # Iterations that bring the images between the keyframes to where their boxes fit.
 FIRST_ITERATIONS = 30
-OTHER_ITERATIONS = 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,8 +49,15 @@ class FinalEstimate:
     """Shape (o, 9, 9)."""
     noise: RepeatedNoise
     """Of boxes."""
+    object_noise: tuple[BoxNoise, ...]
+    """Of each object's boxes, both parts together, (o,)."""
     levels: Floats
     """Of the odometry's components, empty where its covariance was given."""
+    gain: Floats
+    """How much better than the odometry the path by other objects explains each, as the logarithm
+    of a ratio of likelihoods, (o,); NaN where that is unknown."""
+    keeps_odometry: bool
+    """Whether the boxes have not earned it: ``poses`` are the odometry, and objects fit that."""
 
 
 def estimate_all_images(
@@ -78,10 +88,8 @@ def estimate_all_images(
     The estimate; None where there are too many images, or an object reaches a camera.
     """
     detections, model = recording.detections, recording.odometry.pose_model
-    images = np.union1d(keyframes[:1], detections.pose[object_row >= 0])
-    if len(images) > MOST_IMAGES:
-        images = keyframes
-    if not 2 <= len(images) <= MOST_KEYFRAMES:
+    images = _choose_images(keyframes, detections.pose, object_row)
+    if len(images) < 2:
         return None
     path = _core.dead_reckon(model, recording.odometry.first_pose, recording.odometry.relative)
     start = bend_path(model, path, keyframes, poses)
@@ -93,21 +101,51 @@ def estimate_all_images(
     solution = _core.solve(graph.core, options, _core.State(start[images], ellipsoids))
     state = _core.State(solution.poses, solution.landmarks)
     problem = CorrelatedProblem(graph.core, knows_size=not scene.learns_size)
-    found = estimate_with_levels(problem, state, believed)
+    try:
+        found = estimate_with_levels(problem, state, believed)
+    except np.linalg.LinAlgError:  # odometry that is exact, to the digits there are
+        return None
     if found is None:
         return None
+    gain = gain_over_odometry(problem, found, believed.boxes)
+    ends = found.state
+    if not earns_it(gain):
+        ends = map_along_odometry(problem, found, believed.boxes) or ends
     covariance = np.linalg.inv(found.hessian)
     k, count = problem.k, len(images)
     covariance = np.pad(covariance, ((k, 0), (k, 0)))  # the first pose is exact
     return FinalEstimate(
-        bend_path(model, path, images, found.state.poses),
-        np.asarray(found.state.landmarks),
+        bend_path(model, path, images, ends.poses),
+        np.asarray(ends.landmarks),
         images,
         _blocks(covariance[: k * count, : k * count], k),
         _blocks(covariance[k * count :, k * count :], 9),
         believed.boxes,
+        tuple(believed.boxes.times(factors).total for factors in problem.factors),
         believed.of_steps,
+        gain,
+        keeps_odometry=ends is not found.state,
     )
+
+
+def _choose_images(keyframes: Ints, pose: Ints, object_row: Ints) -> Ints:
+    """Return the poses whose boxes, at poses (m,) and of objects (m,), are estimated together.
+
+    None where there are too many.
+    """
+    images = np.union1d(keyframes[:1], pose[object_row >= 0])
+    if len(images) <= MOST_IMAGES:
+        return images
+    if len(keyframes) <= MOST_IMAGES:
+        return keyframes
+    if len(keyframes) > 2 * MOST_IMAGES:
+        return keyframes[:0]
+    images = keyframes[::2]
+    for row in range(int(object_row.max()) + 1):
+        own = pose[object_row == row]
+        if np.isin(images, own).sum() < ENOUGH_VIEWS:
+            images = np.union1d(images, keyframes[np.isin(keyframes, own)])
+    return images
 
 
 def _first_levels(

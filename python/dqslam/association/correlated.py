@@ -13,13 +13,14 @@ import numpy as np
 from dqslam import _core
 from dqslam._checks import Bools, Floats, Ints
 from dqslam.association.repetition import RepeatedNoise, Whitener
+from dqslam.subgraph import only_objects
 
 # Boxes are as heavy in the tails as a multivariate Student t of so many degrees of freedom.
-TAIL_DOF = 5.0
+TAIL_DOF = 3.0
 EDGES = 4
 FIRST_DAMPING, MAX_DAMPING = 1e-6, 1e6
-# An estimate has converged when a step lowers the cost by less than this share.
-SMALL_DECREASE = 1e-5
+# An estimate has converged when a step would lower the cost by less than this share.
+SMALL_DECREASE = 1e-4
 OUTWARD = np.array([-1.0, -1.0, 1.0, 1.0])
 
 
@@ -82,6 +83,14 @@ class CorrelatedProblem:
         steps = len(odometry.from_pose)
         covariance = odometry.covariance.reshape(steps, self.k, self.k)
         self.odometry_precision = np.linalg.inv(covariance)
+        self.factors = np.ones((graph.num_objects, 2))
+        """Of the variances of each object's boxes: of what is new in an image, and what repeats."""
+
+    def part(self, kept: Bools) -> CorrelatedProblem:
+        """Return the problem with some of the objects only, a flag for each, (o,)."""
+        part = CorrelatedProblem(only_objects(self.graph, kept), knows_size=self.knows_size)
+        part.odometry_precision, part.factors = self.odometry_precision, self.factors[kept]
+        return part
 
     def project(self, state: _core.State) -> tuple[Floats, Bools, Floats]:
         """Return errors of boxes (b, 4), whether their objects are in front (b,), Jacobians."""
@@ -113,14 +122,19 @@ class CorrelatedProblem:
 
     def weights(self, error: Floats, noise: RepeatedNoise) -> Floats:
         """Return what the loss leaves of each box, (b,), by its chi-square."""
-        box = self.graph.boxes.box
-        side = np.tile(box[:, 2:] - box[:, :2], (1, 2))
-        total = noise.total
-        chi2 = np.sum(error**2 / (total.pixels**2 + (total.relative * side) ** 2), axis=1)
+        box, factors = self.graph.boxes.box, self.factors[self.graph.boxes.object]
+        parts = noise.edge_variances(np.tile(box[:, 2:] - box[:, :2], (1, 2)))
+        variance = factors[:, :1] * parts[0] + factors[:, 1:] * parts[1]
+        chi2 = np.sum(error**2 / variance, axis=1)
         return np.asarray((TAIL_DOF + EDGES) / (TAIL_DOF + chi2))
 
-    def linearize(self, state: _core.State, noise: RepeatedNoise) -> Linearization | None:
-        """Lay out the normal equations; None if an object is not in front of a camera."""
+    def linearize(
+        self, state: _core.State, noise: RepeatedNoise, *, keeps_poses: bool = False
+    ) -> Linearization | None:
+        """Lay out the normal equations; None if an object is not in front of a camera.
+
+        If poses are to be kept, those of the objects only.
+        """
         error, in_front, jacobian = self.project(state)
         if not in_front.all():
             return None
@@ -137,7 +151,8 @@ class CorrelatedProblem:
             towards = state.landmarks[number, :3] - cameras[poses, :3]
             correlation = noise.correlation(towards)
             counts = np.any(jacobian[rows] != 0.0, axis=2).T
-            whitener = Whitener.of(noise, correlation, boxes.side, weight[rows], counts)
+            own_noise = noise.times(self.factors[number])
+            whitener = Whitener.of(own_noise, correlation, boxes.side, weight[rows], counts)
             correlations.append(correlation)
             whiteners.append(whitener)
             own = slice(k * n + 9 * number, k * n + 9 * number + 9)
@@ -148,11 +163,14 @@ class CorrelatedProblem:
             slope = np.einsum("eia,ei->ia", j, white)
             gradient[: k * n].reshape(n, k)[poses] -= slope[:, :k]
             gradient[own] -= slope[:, k:].sum(axis=0)
-            towards_object = whitener.precision @ j[:, :, k:]
-            cross = np.einsum("eia,eib->iab", j[:, :, :k], towards_object)
-            hessian[own, own] += np.einsum("eia,eib->ab", j[:, :, k:], towards_object)
-            side = hessian[: k * n, own].reshape(n, k, 9)
-            side[poses] += cross
+            by_object = whitener.precision @ j[:, :, k:]
+            hessian[own, own] += np.einsum("eia,eib->ab", j[:, :, k:], by_object)
+            if keeps_poses:
+                continue
+            cross = np.einsum("eia,eib->iab", j[:, :, :k], by_object)
+            at_poses = np.zeros((n, k, 9))
+            at_poses[poses] = cross
+            hessian[: k * n, own] = at_poses.reshape(k * n, 9)
             hessian[own, : k * n] = hessian[: k * n, own].T
             pairs = j[:, :, None, :k] * whitener.precision[:, :, :, None]  # (4, n, n, k)
             between_poses[poses[:, None], poses] += np.matmul(
@@ -184,6 +202,15 @@ class CorrelatedProblem:
             cost += 0.5 * float(np.einsum("ei,eij,ej", e, whitener.precision, e, optimize=True))
         u = 9 * self.graph.num_objects
         return cost + self._add_sizes(state.landmarks, np.zeros((u, u)), np.zeros(u))
+
+    def box_costs(self, here: Linearization) -> Floats:
+        """Return half the sum of squares of each object's boxes, as weighted there, (o,)."""
+        costs = []
+        for boxes, whitener in zip(self.objects, here.whiteners, strict=True):
+            e = here.error[boxes.rows].T
+            white = np.einsum("eij,ej->ei", whitener.precision, e)
+            costs.append(0.5 * float(np.sum(white * e)))
+        return np.array(costs)
 
     def retract(self, state: _core.State, step: Floats) -> _core.State:
         """Move a state by a step (u,)."""
@@ -231,35 +258,41 @@ class CorrelatedProblem:
 
 
 def minimize(
-    problem: CorrelatedProblem, state: _core.State, noise: RepeatedNoise, *, max_iterations: int
+    problem: CorrelatedProblem,
+    state: _core.State,
+    noise: RepeatedNoise,
+    *,
+    max_iterations: int,
+    keeps_poses: bool = False,
 ) -> Linearization | None:
     """Improve a state by Levenberg-Marquardt; None if it is not defined to begin with."""
     from scipy.linalg import cho_factor, cho_solve
 
-    here = problem.linearize(state, noise)
+    here = problem.linearize(state, noise, keeps_poses=keeps_poses)
     damping = FIRST_DAMPING
+    free = slice(problem.k * (problem.graph.num_poses - 1) if keeps_poses else 0, None)
     for _ in range(max_iterations):
         if here is None:
             return None
-        better = None
+        better, expected = None, np.inf
         while better is None and damping < MAX_DAMPING:
-            damped = here.hessian + damping * np.diag(np.diag(here.hessian))
+            damped = here.hessian[free, free].copy()
+            damped[np.diag_indices(len(damped))] *= 1.0 + damping
+            step = np.zeros(len(here.gradient))
             try:
-                step = -cho_solve(cho_factor(damped), here.gradient)
+                step[free] = -cho_solve(cho_factor(damped), here.gradient[free])
             except np.linalg.LinAlgError:
                 damping *= 10.0
                 continue
+            expected = -0.5 * float(step @ here.gradient)
+            if expected < SMALL_DECREASE * here.cost:
+                break
             trial = problem.retract(here.state, step)
-            cost = problem.cost(trial, here)
-            if cost < here.cost:
-                better = trial
-                damping = max(damping / 10.0, FIRST_DAMPING)
+            if problem.cost(trial, here) < here.cost:
+                better, damping = trial, max(damping / 10.0, FIRST_DAMPING)
             else:
                 damping *= 10.0
         if better is None:
             break
-        decrease = here.cost - cost
-        here = problem.linearize(better, noise)
-        if decrease < SMALL_DECREASE * cost:
-            break
+        here = problem.linearize(better, noise, keeps_poses=keeps_poses)
     return here

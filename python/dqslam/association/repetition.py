@@ -18,7 +18,7 @@ from dqslam._checks import Bools, Floats
 from dqslam.assumptions import BoxNoise
 
 # Views of an object that are so far apart [rad] have a correlation of 1 / e.
-CORRELATION_ANGLE = 0.5
+CORRELATION_ANGLE = 0.7
 # Where the levels begin. Those of detectors on tables, streets and desks are 0.3 to 0.6 px and 0.4
 # to 1 % of the side for what is new, 0.8 to 1.5 px and 2 to 4 % for what repeats.
 FIRST_NEW = BoxNoise(pixels=0.7, relative=0.01)
@@ -57,6 +57,16 @@ class RepeatedNoise:
         """Of the four parts: new pixels, new share, repeated pixels, repeated share."""
         parts = (self.new, self.repeated)
         return np.array([[part.pixels, part.relative] for part in parts]).ravel() ** 2
+
+    def edge_variances(self, side: Floats) -> tuple[Floats, Floats]:
+        """Return the variances of both parts, pixels squared, of edges with sides of any shape."""
+        parts = (self.new, self.repeated)
+        new, repeated = (part.pixels**2 + (part.relative * side) ** 2 for part in parts)
+        return new, repeated
+
+    def times(self, factors: Floats) -> RepeatedNoise:
+        """Return the noise of an object, whose variances are so many times as large, (2,)."""
+        return self.with_variances(self.variances * np.repeat(factors, 2))
 
     def with_variances(self, variances: Floats) -> RepeatedNoise:
         """Return the noise with other variances of the four parts, kept within limits."""
@@ -100,9 +110,8 @@ class Whitener:
         ``weight`` (n,) is what a robust loss leaves of each box: it divides the variance of what is
         new, for a box of something else repeats nothing.
         """
-        new = noise.new.pixels**2 + (noise.new.relative * side) ** 2
-        sigma = np.sqrt(noise.repeated.pixels**2 + (noise.repeated.relative * side) ** 2)
-        sigma = np.where(counts, sigma, 0.0)
+        new, repeated = noise.edge_variances(side)
+        sigma = np.where(counts, np.sqrt(repeated), 0.0)
         covariance = correlation * sigma[:, :, None] * sigma[:, None, :]
         diagonal = np.arange(len(weight))
         covariance[:, diagonal, diagonal] += np.where(counts, new / weight, 1.0)

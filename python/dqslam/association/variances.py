@@ -14,7 +14,7 @@ from dqslam import _core
 from dqslam._checks import Bools, Floats
 from dqslam.association.correlated import CorrelatedProblem, Linearization, minimize
 from dqslam.association.noise import StepNoise, corrected
-from dqslam.association.repetition import RepeatedNoise, corrected_variances
+from dqslam.association.repetition import MAX_RATIO, RepeatedNoise, corrected_variances
 
 # Corrections of the levels, and iterations of the estimate before each.
 MAX_CORRECTIONS = 8
@@ -24,6 +24,8 @@ SETTLED = 0.05
 # What an estimate takes from its residuals is a mean over so many draws from its covariance: sums
 # over hundreds of edges are known to a few percent, at a hundredth of the cost of an inverse.
 DRAWS = 100
+# Objects are as hard to draw as the others, unless so many edges show it.
+PRIOR_EDGES_OF_OBJECT = 10.0
 
 
 @dataclass(frozen=True)
@@ -73,7 +75,10 @@ def correct(problem: CorrelatedProblem, here: Linearization, levels: Levels) -> 
     draws = _draws(here.hessian, problem.k)
     before = levels.boxes.variances
     found, expected = _box_components(problem, here, draws)
-    levels.boxes = levels.boxes.with_variances(corrected_variances(before, found, expected))
+    factors = np.repeat(problem.factors, 2, axis=1)
+    sums = np.sum(factors * found, axis=0), np.sum(factors * expected, axis=0)
+    levels.boxes = levels.boxes.with_variances(corrected_variances(before, *sums))
+    problem.factors = corrected_factors(problem.factors, before * found, before * expected)
     change = 0.5 * np.abs(np.log(levels.boxes.variances / before))
     # A part that is next to nothing does not matter, however it changes.
     largest = float(np.max(change[_matters(problem, before)], initial=0.0))
@@ -87,6 +92,18 @@ def correct(problem: CorrelatedProblem, here: Linearization, levels: Levels) -> 
         problem.odometry_precision = np.linalg.inv(covariance)
         largest = max(largest, better.change)
     return largest
+
+
+def corrected_factors(factors: Floats, found: Floats, expected: Floats) -> Floats:
+    """Return better factors of the variances of objects, (o, 2): new, and repeated.
+
+    ``found`` and ``expected`` are the squares of the four parts in units of the variances that were
+    believed of all objects, (o, 4). The factors of all objects have a geometric mean of 1.
+    """
+    count = factors * found.reshape(-1, 2, 2).sum(axis=2) + PRIOR_EDGES_OF_OBJECT
+    usual = factors * expected.reshape(-1, 2, 2).sum(axis=2) + PRIOR_EDGES_OF_OBJECT * factors
+    better = factors * np.clip(count / usual, 1.0 / MAX_RATIO, MAX_RATIO)
+    return np.asarray(better / np.exp(np.mean(np.log(better), axis=0)))
 
 
 def _matters(problem: CorrelatedProblem, variances: Floats) -> Bools:
@@ -109,10 +126,10 @@ def _draws(hessian: Floats, k: int) -> Floats:
 def _box_components(
     problem: CorrelatedProblem, here: Linearization, draws: Floats
 ) -> tuple[Floats, Floats]:
-    """Return squares found and expected of the four parts of the boxes' variances."""
+    """Return squares found and expected of the four parts of each object's variances, (o, 4)."""
     n, k = problem.graph.num_poses, problem.k
     by_pose, by_object = draws[: k * n].reshape(n, k, -1), draws[k * n :].reshape(-1, 9, DRAWS)
-    found, expected = np.zeros(4), np.zeros(4)
+    found, expected = np.zeros((2, len(problem.objects), 4))
     for number, (boxes, whitener, correlation) in enumerate(
         zip(problem.objects, here.whiteners, here.correlations, strict=True)
     ):
@@ -123,9 +140,9 @@ def _box_components(
         left = np.einsum("eij,ej->ei", whitener.precision, here.error[boxes.rows].T)
         parts = whitener.components(correlation, boxes.side, here.weight[boxes.rows])
         for part, shape in enumerate(parts):
-            found[part] += np.einsum("ei,eij,ej", left, shape, left, optimize=True)
-            expected[part] += np.sum(whitener.precision * shape)
-            expected[part] -= np.sum(taken * (shape @ taken)) / DRAWS
+            found[number, part] = np.einsum("ei,eij,ej", left, shape, left, optimize=True)
+            expected[number, part] = np.sum(whitener.precision * shape)
+            expected[number, part] -= np.sum(taken * (shape @ taken)) / DRAWS
     return found, np.maximum(expected, 0.0)
 
 

@@ -21,6 +21,7 @@ from dqslam.estimate import Estimate
 from dqslam.graph import solve
 from dqslam.pipeline.conclude import EstimatorOutput
 from dqslam.pipeline.options import Progress, RunOptions
+from dqslam.pipeline.report import describe_evidence
 from dqslam.recording import Recording
 from dqslam.uncertainty import Marginals, UnderConstrained, marginal_covariances
 
@@ -55,6 +56,9 @@ def estimate_batch(
         box_noise=scene.box_noise if final is None else final.noise.total,
         odometry_noise=scene.odometry_noise if tells_noise else None,
         noise_levels=scene.noise_levels,
+        object_noise=() if final is None else final.object_noise,
+        repeated=None if final is None else final.noise,
+        evidence=None if final is None else describe_evidence(final, estimate.initial_poses),
         remarks=found.remarks,
         calibration=findings,
     )
