@@ -13,6 +13,7 @@ import numpy as np
 
 from dqslam import _core
 from dqslam._checks import Floats, Ints
+from dqslam.association.between import estimate_between
 from dqslam.association.correlated import CorrelatedProblem
 from dqslam.association.earning import earns_it, gain_over_odometry, map_along_odometry
 from dqslam.association.noise import StepNoise
@@ -111,11 +112,22 @@ def estimate_all_images(
     ends = found.state
     if not earns_it(gain):
         ends = map_along_odometry(problem, found, believed.boxes) or ends
+    everything = bend_path(model, path, images, ends.poses)
+    if ends is found.state:
+        everything = estimate_between(
+            _with_levels(recording, believed),
+            object_row,
+            images,
+            everything,
+            problem,
+            found,
+            believed.boxes,
+        )
     covariance = np.linalg.inv(found.hessian)
     k, count = problem.k, len(images)
     covariance = np.pad(covariance, ((k, 0), (k, 0)))  # the first pose is exact
     return FinalEstimate(
-        bend_path(model, path, images, ends.poses),
+        everything,
         np.asarray(ends.landmarks),
         images,
         _blocks(covariance[: k * count, : k * count], k),
@@ -159,6 +171,16 @@ def _first_levels(
     inflation = scene.inflation[between.clip(0, len(scene.inflation) - 1)]
     steps = StepNoise.between(recording, images)
     return Levels(RepeatedNoise(), steps, scene.levels, inflation, scene.lowest_levels)
+
+
+def _with_levels(recording: Recording, believed: Levels) -> Recording:
+    """Return a recording whose steps have the noise that is believed."""
+    if believed.steps is None:
+        return recording
+    count = len(recording.timestamps)
+    steps = StepNoise.between(recording, np.arange(count))
+    covariance = steps.covariance(believed.of_steps)
+    return replace(recording, odometry=replace(recording.odometry, covariance=covariance))
 
 
 def _lay_out(

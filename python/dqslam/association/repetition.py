@@ -75,17 +75,17 @@ class RepeatedNoise:
         sigma = np.clip(np.sqrt(variances), least, most).tolist()
         return RepeatedNoise(BoxNoise(*sigma[:2]), BoxNoise(*sigma[2:]), self.angle)
 
-    def correlation(self, towards: Floats) -> Floats:
-        """Return the correlation of views (n, n); ``towards`` leads from camera to object, (n, 3).
+    def correlation(self, towards: Floats, others: Floats | None = None) -> Floats:
+        """Return the correlation of views of an object with each other, or with others (n, m).
 
-        All in the frame of the object, which is that of the world.
+        Both lead from the camera to the object, in the frame of the world, (n, 3) and (m, 3).
         """
-        distance = np.linalg.norm(towards, axis=1)
-        direction = towards / distance[:, None]
+        others = towards if others is None else others
+        distance, other = np.linalg.norm(towards, axis=1), np.linalg.norm(others, axis=1)
         # Of nearly equal directions, the chord keeps the digits that the cosine loses.
-        chord = np.linalg.norm(direction[:, None] - direction, axis=2)
-        angle = 2.0 * np.arcsin(np.clip(0.5 * chord, 0.0, 1.0))
-        nearer = np.log(distance[:, None] / distance)
+        apart = (towards / distance[:, None])[:, None] - others / other[:, None]
+        angle = 2.0 * np.arcsin(np.clip(0.5 * np.linalg.norm(apart, axis=2), 0.0, 1.0))
+        nearer = np.log(distance[:, None] / other)
         return np.asarray(np.exp(-np.hypot(angle, nearer) / self.angle))
 
 
