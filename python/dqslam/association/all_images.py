@@ -123,9 +123,9 @@ def estimate_all_images(
             found,
             believed.boxes,
         )
-    covariance = np.linalg.inv(found.hessian)
+    covariance = np.asarray(np.linalg.inv(found.hessian), dtype=np.float64)
     k, count = problem.k, len(images)
-    covariance = np.pad(covariance, ((k, 0), (k, 0)))  # the first pose is exact
+    covariance = np.asarray(np.pad(covariance, ((k, 0), (k, 0))))  # the first pose is exact
     return FinalEstimate(
         everything,
         np.asarray(ends.landmarks),
@@ -160,9 +160,7 @@ def _choose_images(keyframes: Ints, pose: Ints, object_row: Ints) -> Ints:
     return images
 
 
-def _first_levels(
-    recording: Recording, scene: SceneMap, keyframes: Ints, images: Ints
-) -> Levels:
+def _first_levels(recording: Recording, scene: SceneMap, keyframes: Ints, images: Ints) -> Levels:
     """Return what to believe of boxes and of motions between images, to begin with."""
     motions = len(images) - 1
     if scene.step_noise is None:

@@ -99,16 +99,15 @@ def predict_errors(
     known = _core.world_from_camera(model, camera, found.state.poses)
     error, variance = np.zeros((2, len(box), 4))
     side = np.tile(box[:, 2:] - box[:, :2], (1, 2)).T
-    for number, (boxes, whitener) in enumerate(
-        zip(problem.objects, found.whiteners, strict=True)
-    ):
+    for number, (boxes, whitener) in enumerate(zip(problem.objects, found.whiteners, strict=True)):
         rows = np.flatnonzero(object_row == number)
         own, center = noise.times(problem.factors[number]), found.state.landmarks[number, :3]
         new, repeated = own.edge_variances(side[:, rows])
         before = np.sqrt(own.edge_variances(boxes.side)[1])
-        alike = noise.correlation(
-            center - cameras[rows, :3], center - known[boxes.poses, :3]
-        ) * before[:, None, :]
+        alike = (
+            noise.correlation(center - cameras[rows, :3], center - known[boxes.poses, :3])
+            * before[:, None, :]
+        )
         white = np.einsum("eij,ej->ei", whitener.precision, found.error[boxes.rows].T)
         error[rows] = (np.sqrt(repeated) * np.einsum("eri,ei->er", alike, white)).T
         explained = np.sum((alike @ whitener.precision) * alike, axis=2)

@@ -77,7 +77,7 @@ class CorrelatedProblem:
         for number in range(graph.num_objects):
             rows = np.flatnonzero(boxes.object == number)
             # Of two boxes on one object in an image, the first is the surer one.
-            poses, first = np.unique(boxes.pose[rows], return_index=True)
+            poses, first = np.unique(boxes.pose[rows].astype(np.int64), return_index=True)
             self.objects.append(ObjectBoxes(rows[first], poses, side[:, rows[first]]))
         odometry = graph.odometry
         steps = len(odometry.from_pose)
@@ -111,7 +111,7 @@ class CorrelatedProblem:
         return np.where(ignored, 0.0, error), in_front, jacobian * ~ignored[:, :, None]
 
     def odometry_errors(self, poses: Floats) -> tuple[Floats, Floats]:
-        """Return how far motions are from the measured ones (s, k), by moves of the start (s, k, k).
+        """Return how far motions are from those measured (s, k), by moves of the start (s, k, k).
 
         By moves of the end, the derivative is the identity.
         """

@@ -118,7 +118,9 @@ def _finish(
             estimate,
             poses=final.poses,
             ellipsoids=final.ellipsoids,
-            dual_quadrics=np.array([_core.dual_quadric_from_ellipsoid(e) for e in final.ellipsoids]),
+            dual_quadrics=np.array(
+                [_core.dual_quadric_from_ellipsoid(e) for e in final.ellipsoids]
+            ),
         )
         poses[:] = np.nan
         poses[final.images] = final.pose_covariance

@@ -28,7 +28,8 @@ def box_chi2(
 ) -> NDArray[np.float64]:
     """Compare boxes with the estimate: chi-square with 4 dof, shape (m,).
 
-    ``noise`` is that of all boxes, or one for each object of the estimate. Infinite where the object is not in front of the camera that saw it, no ellipsoid, or dropped.
+    ``noise`` is that of all boxes, or one for each object of the estimate. Infinite where the
+    object is not in front of the camera that saw it, no ellipsoid, or dropped.
     """
     if not len(estimate.object_ids):
         return np.full(len(detections), np.inf)
