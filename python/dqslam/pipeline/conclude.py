@@ -28,6 +28,7 @@ from dqslam.pipeline.report import (
     warn_of_boxes,
     warn_of_calibration,
     warn_of_evidence,
+    warn_of_sizes,
 )
 from dqslam.recording import Detections
 from dqslam.uncertainty import Marginals
@@ -119,6 +120,7 @@ def conclude(
             *output.remarks,
             *warn_of_evidence(output.evidence),
             *warn_of_boxes(len(output.object_id), int(mapped.sum())),
+            *warn_of_sizes(estimate, output.size_prior),
             *warn_of_calibration(output.calibration),
         ],
         "mode": options.mode.name.lower(),

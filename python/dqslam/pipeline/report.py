@@ -19,6 +19,9 @@ from dqslam.uncertainty import Marginals
 
 # A map that fewer boxes show is worth a warning.
 ENOUGH_EXPLAINED = 0.5
+# An axis is odd that is so many standard deviations of the logarithm from the usual one: with 0.7,
+# the spread of a recording, eight times as long or as short.
+MOST_SIZE_SIGMAS = 3.0
 # Score tests take the errors of boxes for independent. Those of real detectors are not.
 SURE_OF_CALIBRATION = 10.0  # sigmas
 
@@ -73,6 +76,22 @@ def warn_of_boxes(count: int, explained: int) -> list[str]:
         f"only {explained} of {count} boxes show an object of the map: the trajectory rests on "
         "these, the others moved, were seen too rarely, or do not fit"
     ]
+
+
+def warn_of_sizes(estimate: Estimate, prior: SizePrior | SizePriors) -> list[str]:
+    """Warn of objects with an axis that is far from the sizes that are expected of their class."""
+    warnings = []
+    for row, name in enumerate(estimate.class_names):
+        expected, axes = prior.of(name), estimate.semi_axes[row]
+        off = np.abs(np.log(axes) - expected.log_mean) / expected.log_sigma
+        if off.max() > MOST_SIZE_SIGMAS:
+            size = " x ".join(f"{2.0 * axis:.2g}" for axis in axes)
+            warnings.append(
+                f"object {estimate.object_ids[row]} ({name}) is {size} m, where "
+                f"{2.0 * np.exp(expected.log_mean):.2g} m is usual: its boxes leave its shape "
+                "open, or show more than one thing"
+            )
+    return warnings
 
 
 def warn_of_calibration(findings: tuple[CalibrationFinding, ...]) -> list[str]:
