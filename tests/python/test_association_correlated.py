@@ -28,11 +28,11 @@ def make(noise=NOISE, seed=0, poses=60):
     )
 
 
-def lay_out(made, **options):
+def lay_out(made):
     graph = build_graph(made.with_ids(), size_prior=SizePrior(float(np.log(0.06)), 0.7))
     mapped = _core.solve(graph.core, _core.SolveOptions(loss=_core.Loss.CAUCHY))
     state = _core.State(mapped.poses, mapped.landmarks)
-    return CorrelatedProblem(graph.core, **({"knows_size": False} | options)), state
+    return CorrelatedProblem(graph.core), state
 
 
 @pytest.fixture(scope="module")
@@ -40,9 +40,8 @@ def made():
     return make()
 
 
-@pytest.mark.parametrize("knows_size", [False, True])
-def test_the_gradient_and_the_hessian_are_those_of_the_cost(made, knows_size):
-    problem, state = lay_out(made, knows_size=knows_size)
+def test_the_gradient_and_the_hessian_are_those_of_the_cost(made):
+    problem, state = lay_out(made)
     noise = RepeatedNoise()
     near = minimize(problem, state, noise, max_iterations=3)
     random = np.random.default_rng(0)
@@ -57,21 +56,6 @@ def test_the_gradient_and_the_hessian_are_those_of_the_cost(made, knows_size):
         back = problem.cost(problem.retract(state, -step), here)
         assert ahead - back == pytest.approx(2.0 * step @ here.gradient, rel=1e-3, abs=1e-6)
         assert ahead + back - 2.0 * here.cost == pytest.approx(1e-6, rel=0.02)
-
-
-def test_a_common_factor_of_all_sizes_costs_nothing_unless_sizes_are_known(made):
-    problem, state = lay_out(made)
-    larger = state.landmarks.copy()
-    larger[:, 3:6] += np.log(2.0)
-    larger[:, 6:] *= 2.0
-    u = 9 * problem.graph.num_objects
-
-    def cost(objects, problem):
-        return problem._add_sizes(objects, np.zeros((u, u)), np.zeros(u))
-
-    assert cost(larger, problem) == pytest.approx(cost(state.landmarks, problem), rel=1e-9)
-    knowing = CorrelatedProblem(problem.graph, knows_size=True)
-    assert cost(larger, knowing) != pytest.approx(cost(state.landmarks, knowing), rel=0.01)
 
 
 def test_levels_of_boxes_are_recovered(made):
@@ -218,6 +202,6 @@ def test_two_boxes_of_an_object_in_an_image_count_once(made):
         object_id=np.append(detections.object_id, detections.object_id[0]),
     )
     graph = build_graph(replace(recording, detections=twice))
-    problem = CorrelatedProblem(graph.core, knows_size=True)
+    problem = CorrelatedProblem(graph.core)
     boxes = problem.objects[int(graph.core.boxes.object[0])]
     assert len(np.unique(boxes.poses)) == len(boxes.poses)

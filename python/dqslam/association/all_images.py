@@ -101,7 +101,7 @@ def estimate_all_images(
     options = _options(FIRST_ITERATIONS)
     solution = _core.solve(graph.core, options, _core.State(start[images], ellipsoids))
     state = _core.State(solution.poses, solution.landmarks)
-    problem = CorrelatedProblem(graph.core, knows_size=not scene.learns_size)
+    problem = CorrelatedProblem(graph.core)
     try:
         found = estimate_with_levels(problem, state, believed)
     except np.linalg.LinAlgError:  # odometry that is exact, to the digits there are

@@ -60,17 +60,15 @@ class Linearization:
 
 
 class CorrelatedProblem:
-    """A problem whose boxes have errors that repeat; sizes may have a common unknown median."""
+    """A problem whose boxes have errors that repeat from view to view."""
 
-    def __init__(self, graph: _core.Graph, *, knows_size: bool) -> None:
+    def __init__(self, graph: _core.Graph) -> None:
         """Take the poses, odometry, boxes and size priors of a problem, and their covariances.
 
-        ``knows_size`` tells whether the median of the size prior is known; if not, a factor that is
-        common to all objects costs nothing. Covariances of boxes are not used.
+        Covariances of boxes are not used.
         """
         self.graph = graph
         self.k = 3 if graph.pose_model == _core.PoseModel.SE2 else 6
-        self.knows_size = knows_size
         boxes = graph.boxes
         side = np.tile(boxes.box[:, 2:] - boxes.box[:, :2], (1, 2)).T
         self.objects = []
@@ -88,7 +86,7 @@ class CorrelatedProblem:
 
     def part(self, kept: Bools) -> CorrelatedProblem:
         """Return the problem with some of the objects only, a flag for each, (o,)."""
-        part = CorrelatedProblem(only_objects(self.graph, kept), knows_size=self.knows_size)
+        part = CorrelatedProblem(only_objects(self.graph, kept))
         part.odometry_precision, part.factors = self.odometry_precision, self.factors[kept]
         return part
 
@@ -247,11 +245,6 @@ class CorrelatedProblem:
                 _core.log_semi_axes_jacobian(one) / prior.log_sigma[row]
             )
         r = off.ravel()
-        if not self.knows_size:  # a common factor moves all of these at once
-            common = np.repeat(1.0 / prior.log_sigma, 3)
-            common /= np.linalg.norm(common)
-            r = r - common * (common @ r)
-            j -= np.outer(common, common @ j)
         hessian += j.T @ j
         gradient += j.T @ r
         return 0.5 * float(r @ r)
