@@ -1,15 +1,16 @@
 """What a report says of boxes, objects and the path."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from dqslam import _core
-from dqslam.assumptions import BoxNoise, OdometryNoise
+from dqslam.assumptions import BoxNoise, OdometryNoise, SizePrior, SizePriors
 from dqslam.io import Trajectory, load_recording
 from dqslam.pipeline import RunOptions, run
-from dqslam.pipeline.report import box_chi2
+from dqslam.pipeline.report import box_chi2, describe_evidence, warn_of_evidence, warn_of_sizes
 from dqslam.simulation import perturb_odometry
 from orbit import make_orbit, write_orbit
 
@@ -73,3 +74,77 @@ def test_reference_in_another_frame_and_rate(files, orbit):
     for when in ("before", "after"):
         for name in ("ate_rmse_m", "mean_m"):
             assert errors[0][when][name] == pytest.approx(errors[1][when][name], rel=1e-6)
+
+
+def test_objects_have_a_place_a_size_and_a_sigma(files, orbit):
+    recording, _ = load_recording(*files)
+    result = run(perturb_odometry(recording, NOISE, seed=0))
+    estimate = result.estimate
+    for row, entry in enumerate(result.report["objects"]):
+        np.testing.assert_array_equal(entry["center_m"], estimate.centers[row])
+        np.testing.assert_array_equal(entry["semi_axes_m"], estimate.semi_axes[row])
+        variance = np.trace(result.marginals.centers[row])
+        assert entry["center_sigma_m"] == pytest.approx(np.sqrt(variance))
+        assert 0.0 < entry["center_sigma_m"] < 0.1
+
+
+def test_evidence_for_an_estimate_and_against_it(files):
+    recording, _ = load_recording(*files)
+    noisy = run(perturb_odometry(recording, NOISE, seed=0)).report
+    evidence = noisy["evidence"]
+    assert evidence["log_likelihood_gain"] > 10.0
+    assert evidence["objects_for"] + evidence["objects_against"] == len(noisy["objects"])
+    assert not evidence["odometry_kept"]
+    assert 0.005 < evidence["rms_correction_m"] < 0.2
+    parts = noisy["box_noise"]
+    for name in ("pixels", "relative"):
+        total = np.hypot(parts["new"][name], parts["repeated"][name])
+        assert parts[name] == pytest.approx(total)
+
+
+def test_where_the_odometry_is_kept_the_report_says_so():
+    final = SimpleNamespace(
+        gain=np.array([1.0, -3.0, np.nan]), poses=np.zeros((4, 7)), keeps_odometry=True
+    )
+    path = np.zeros((4, 7))
+    path[:, 0] = 2.0
+    evidence = describe_evidence(final, path)
+    assert evidence == {
+        "log_likelihood_gain": -2.0,
+        "objects_for": 1,
+        "objects_against": 1,
+        "odometry_kept": True,
+        "rms_correction_m": 2.0,
+    }
+    assert "the odometry is kept" in warn_of_evidence(evidence)[0]
+    assert "-2" in warn_of_evidence(evidence)[0]
+    assert warn_of_evidence(evidence | {"odometry_kept": False}) == []
+    assert warn_of_evidence(None) == []
+
+
+def test_each_object_may_have_a_noise_of_its_own(files):
+    recording, _ = load_recording(*files)
+    estimate = run(recording, RunOptions(mode=_core.Mode.MAPPING)).estimate
+    count = len(estimate.object_ids)
+    same = box_chi2(estimate, recording.detections, BoxNoise(2.0, 0.0))
+    noises = [BoxNoise(2.0 * (1 + row), 0.0) for row in range(count)]
+    own = box_chi2(estimate, recording.detections, noises)
+    row = np.searchsorted(estimate.object_ids, recording.detections.object_id).clip(max=count - 1)
+    fits = np.isfinite(same)
+    np.testing.assert_allclose(own[fits], same[fits] / (1.0 + row[fits]) ** 2)
+
+
+def test_an_object_of_an_odd_size_is_named(files):
+    recording, _ = load_recording(*files)
+    estimate = run(recording, RunOptions(mode=_core.Mode.MAPPING)).estimate
+    usual = SizePrior(float(np.log(0.1)), 0.7)
+    assert warn_of_sizes(estimate, usual) == []
+    odd = estimate.ellipsoids.copy()
+    turn = np.array([0.0, 0.0, 0.0, 1.0])
+    odd[1] = _core.ellipsoid_from_axes(odd[1, :3], np.array([1.8, 0.065, 0.06]), turn)
+    (warning,) = warn_of_sizes(replace(estimate, ellipsoids=odd), usual)
+    name = f"object {estimate.object_ids[1]} ({estimate.class_names[1]})"
+    assert warning.startswith(f"{name} is 3.6 x 0.13 x 0.12 m, where 0.2 m is usual")
+    # What is known of its class makes it usual.
+    known = SizePriors({estimate.class_names[1]: SizePrior(float(np.log(0.3)), 1.0)}, usual)
+    assert warn_of_sizes(replace(estimate, ellipsoids=odd), known) == []

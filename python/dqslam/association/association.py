@@ -27,6 +27,8 @@ from dqslam.recording import Recording
 # Trust in ids that are final, and the most where they are not: of tracklets that are linked in the
 # image, 1 in 10 goes over to another object.
 FINAL, UNSURE = 1.0, 0.9
+# Iterations that bring the images between keyframes to where their boxes fit.
+FOLLOW_ITERATIONS = 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,6 +175,8 @@ def associate(
         object_id, ids = tracker_ids.copy(), _ids_of(labels, tracker_ids[used])
     else:
         everything = _with_all_images(scene, recording, keyframes, tracklets, used)
+        if mode == _core.Mode.SLAM:
+            _follow_tracklets(everything)
         reassign(everything, attempt.follower.switch_cost)
         object_id, ids = _numbered(everything.labels.object_rows, len(scene.ellipsoids))
     progress(1.0)
@@ -225,10 +229,36 @@ def _with_all_images(
     labels = Labels.of(recording.detections, cut)
     labels.votes = scene.labels.votes.copy()
     labels.object_of_tracklet = scene.labels.object_of_tracklet.copy()
-    everything = SceneMap(recording, labels, box_noise=scene.box_noise, size_prior=scene.size_prior)
+    labels.left_out = dict(scene.labels.left_out)
+    steps = None
+    if scene.step_noise is not None:
+        steps = StepNoise.between(recording, np.arange(len(recording.timestamps)))
+    everything = SceneMap(
+        recording,
+        labels,
+        box_noise=scene.box_noise,
+        size_prior=scene.size_prior,
+        step_noise=steps,
+        levels=scene.levels,
+    )
     everything.poses = fill_in(recording, keyframes, scene.poses)
-    everything.ellipsoids = scene.ellipsoids
+    everything.ellipsoids = scene.ellipsoids.copy()
     return everything
+
+
+def _follow_tracklets(everything: SceneMap) -> None:
+    """Bring the poses between keyframes to where the tracklets of known objects fit, for a while.
+
+    Where odometry is worse than boxes, the path between keyframes is too far off to tell which box
+    shows which object; the tracklets that go through both keyframes know.
+    """
+    labels = everything.labels
+    votes = labels.votes.copy()
+    owner = labels.object_of_tracklet[labels.tracklets]
+    labels.assign(np.arange(len(owner)), owner)
+    everything.estimate(max_iterations=FOLLOW_ITERATIONS)
+    labels.object_rows[:] = -1
+    labels.votes = votes
 
 
 def _cut_alike(tracklet: Ints, pose: Ints, used: Bools, cut: Ints) -> Ints:

@@ -11,6 +11,7 @@ level corrected.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -156,6 +157,18 @@ def translation_axes(k: int) -> int:
     return k // 2 + k % 2
 
 
+class OdometryFit(Protocol):
+    """How well the motions between keyframes fit an estimate."""
+
+    @property
+    def odometry_residuals(self) -> Floats:
+        """In sigmas, by the inverse of the covariance's Cholesky factor, shape (s, k)."""
+
+    @property
+    def odometry_leverage(self) -> Floats:
+        """From 0 to 1, shape (s, k)."""
+
+
 @dataclass(frozen=True)
 class Correction:
     """Better levels of the noise, and how far they are from those that were believed."""
@@ -169,7 +182,7 @@ class Correction:
 
 
 def corrected(
-    noise: StepNoise, levels: Floats, inflation: Floats, fit: _core.Fit, *, lowest: Floats
+    noise: StepNoise, levels: Floats, inflation: Floats, fit: OdometryFit, *, lowest: Floats
 ) -> Correction:
     """Return better levels from the residuals of an estimate that believed some.
 

@@ -56,7 +56,10 @@ def _overview(report: dict[str, Any]) -> "Table":
             f"not fit (above 13.28), {boxes['not_in_front']} of them not even in front",
         )
     table.add_row("re-projection", _reprojection(report["reprojection"]))
+    table.add_row("noise of a box edge", _box_noise(report["box_noise"]))
     table.add_row("odometry noise", _noise(report["odometry_noise"]))
+    if report["evidence"] is not None:
+        table.add_row("boxes held out", _evidence(report["evidence"]))
     error = report["trajectory_error"]
     if error is None:
         table.add_row("trajectory error", "unknown: there is nothing to compare with")
@@ -75,6 +78,29 @@ def _reprojection(overlap: dict[str, Any]) -> str:
     return (
         f"median IoU {overlap['iou_median']:.2f} of the boxes {which}; "
         f"{overlap['explained_share']:.0%} of those of mapped classes reach 0.5"
+    )
+
+
+def _box_noise(noise: dict[str, Any]) -> str:
+    def part(of: dict[str, Any]) -> str:
+        return f"{of['pixels']:.2g} px and {of['relative']:.1%} of the side"
+
+    if "repeated" not in noise:
+        return part(noise)
+    return (
+        f"{part(noise['new'])}, new in each image; {part(noise['repeated'])}, "
+        "the same from the same side"
+    )
+
+
+def _evidence(evidence: dict[str, Any]) -> str:
+    if evidence["log_likelihood_gain"] is None:
+        return "none: the estimate cannot be compared with the odometry"
+    return (
+        f"{evidence['objects_for']} objects fit better to the path by the others than to the "
+        f"odometry, {evidence['objects_against']} worse (log likelihoods differ by "
+        f"{evidence['log_likelihood_gain']:.4g}): "
+        + ("the odometry is kept" if evidence["odometry_kept"] else "the estimate is used")
     )
 
 
@@ -106,15 +132,19 @@ def _objects(objects: list[dict[str, Any]]) -> "Table":
     from rich.table import Table
 
     table = Table(box=SIMPLE_HEAD)
-    for heading in ("id", "class", "boxes", "chi-square, median", "do not fit", "not in front"):
+    headings = ("id", "class", "boxes", "center [m]", "± [m]", "size [m]", "chi-square", "outliers")
+    for heading in headings:
         table.add_column(heading, justify="left" if heading == "class" else "right")
     for entry in objects:
+        sigma, axes = entry["center_sigma_m"], entry["semi_axes_m"]
         table.add_row(
             str(entry["id"]),
             escape(entry["class_name"]),
             str(entry["observations"]),
-            f"{entry['chi2_median']:.2f}",
-            f"{entry['outlier_share']:.0%}",
-            str(entry["not_in_front"]),
+            " ".join(f"{value:.3g}" for value in entry["center_m"]),
+            "unknown" if sigma is None else f"{sigma:.2g}",
+            "unknown" if None in axes else " x ".join(f"{2.0 * axis:.2g}" for axis in axes),
+            "none" if entry["chi2_median"] is None else f"{entry['chi2_median']:.2f}",
+            "none" if entry["outlier_share"] is None else f"{entry['outlier_share']:.0%}",
         )
     return table

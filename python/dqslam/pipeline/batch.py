@@ -9,13 +9,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dqslam import _core
-from dqslam.association import Association, associate, fill_in
+from dqslam.association import (
+    Association,
+    FinalEstimate,
+    associate,
+    estimate_all_images,
+    fill_in,
+)
 from dqslam.calibration import CalibrationFinding, check_calibration
 from dqslam.estimate import Estimate
 from dqslam.graph import Graph, solve
 from dqslam.pipeline.conclude import EstimatorOutput
 from dqslam.pipeline.lens import with_exact_boxes
 from dqslam.pipeline.options import Progress, RunOptions
+from dqslam.pipeline.report import describe_evidence
 from dqslam.recording import Recording
 from dqslam.uncertainty import Marginals, UnderConstrained, marginal_covariances
 
@@ -39,27 +46,39 @@ def estimate_batch(
     )
     solver = options.solve_options()
     solver.schedule = _core.Schedule.BATCH
-    estimate, marginals, summary, findings = _finish(recording, found, solver)
+    estimate, marginals, summary, findings, final = _finish(recording, found, solver, options)
     tells_noise = options.estimates_noise and options.mode != _core.Mode.MAPPING
+    scene = found.scene
+    if final is not None and scene.step_noise is not None:
+        scene.levels = final.levels
     return EstimatorOutput(
         estimate,
         marginals,
         summary,
         object_id=found.object_id,
-        keyframes=len(found.keyframes),
-        size_prior=found.scene.size_prior,
-        box_noise=found.scene.box_noise,
-        odometry_noise=found.scene.odometry_noise if tells_noise else None,
-        noise_levels=found.scene.noise_levels,
+        keyframes=len(found.keyframes if final is None else final.images),
+        size_prior=scene.size_prior,
+        box_noise=scene.box_noise if final is None else final.noise.total,
+        odometry_noise=scene.odometry_noise if tells_noise else None,
+        noise_levels=scene.noise_levels,
+        object_noise=() if final is None else final.object_noise,
+        repeated=None if final is None else final.noise,
+        evidence=None if final is None else describe_evidence(final, estimate.initial_poses),
         remarks=found.remarks,
         calibration=findings,
     )
 
 
 def _finish(
-    recording: Recording, found: Association, options: _core.SolveOptions
-) -> tuple[Estimate, Marginals | None, _core.Summary | None, tuple[CalibrationFinding, ...]]:
-    """Polish what the association ends with, and fill in the poses between the keyframes.
+    recording: Recording, found: Association, solver: _core.SolveOptions, options: RunOptions
+) -> tuple[
+    Estimate,
+    Marginals | None,
+    _core.Summary | None,
+    tuple[CalibrationFinding, ...],
+    FinalEstimate | None,
+]:
+    """Polish what the association ends with, and use all images, not only keyframes.
 
     Tests the calibration, too, unless the poses are given.
     """
@@ -67,9 +86,9 @@ def _finish(
     path = _core.dead_reckon(odometry.pose_model, odometry.first_pose, odometry.relative)
     graph = found.scene.graph()
     if graph is None:
-        return _nothing(recording, path, found.left_out), None, None, ()
+        return _nothing(recording, path, found.left_out), None, None, (), None
     graph, solved, summary = _solve_exactly(
-        recording.camera, graph, found.scene.state(graph), options
+        recording.camera, graph, found.scene.state(graph), solver
     )
     ids = found.ids[solved.object_ids]
     order = np.argsort(ids)
@@ -78,8 +97,8 @@ def _finish(
     dropped.pop(-1, None)
     nothing = _nothing(recording, path, dropped)
     if not order.size:
-        return nothing, None, None, ()
-    marginals = marginal_covariances(graph, solved, options)
+        return nothing, None, None, (), None
+    marginals = marginal_covariances(graph, solved, solver)
     boxes = dict(zip(*np.unique(found.object_id, return_counts=True), strict=True))
     estimate = replace(
         nothing,
@@ -98,12 +117,49 @@ def _finish(
         objects=marginals.objects[order],
         under_constrained=tuple(_named(part, found) for part in marginals.under_constrained),
     )
+    final = None
+    # The boxes of a lens are exact only in the problem of the keyframes.
+    if (
+        solver.mode == _core.Mode.SLAM
+        and options.box_noise is None
+        and not recording.camera.has_distortion
+    ):
+        final = _use_all_images(recording, found, solved.poses, estimate)
+    if final is not None:
+        estimate = replace(
+            estimate,
+            poses=final.poses,
+            ellipsoids=final.ellipsoids,
+            dual_quadrics=np.array(
+                [_core.dual_quadric_from_ellipsoid(e) for e in final.ellipsoids]
+            ),
+        )
+        poses[:] = np.nan
+        poses[final.images] = final.pose_covariance
+        marginals = replace(marginals, poses=poses, objects=final.object_covariance)
     findings: tuple[CalibrationFinding, ...] = ()
-    if options.mode == _core.Mode.SLAM:
+    if solver.mode == _core.Mode.SLAM:
         # Where an object reaches the camera, a box next to the estimate's is undefined: no test.
         with contextlib.suppress(RuntimeError, ValueError):
-            findings = check_calibration(graph, solved, options)
-    return estimate, marginals, summary, findings
+            findings = check_calibration(graph, solved, solver)
+    return estimate, marginals, summary, findings, final
+
+
+def _use_all_images(
+    recording: Recording, found: Association, poses: NDArray[np.float64], estimate: Estimate
+) -> FinalEstimate | None:
+    """Estimate by all images, from the poses of keyframes (f, d) and the objects of an estimate."""
+    place = np.searchsorted(estimate.object_ids, found.object_id)
+    place = place.clip(max=len(estimate.object_ids) - 1)
+    mapped = estimate.object_ids[place] == found.object_id
+    return estimate_all_images(
+        recording,
+        found.scene,
+        found.keyframes,
+        np.where(mapped, place, -1),
+        poses,
+        estimate.ellipsoids,
+    )
 
 
 def _solve_exactly(

@@ -9,7 +9,7 @@ import numpy as np
 
 from dqslam import _core
 from dqslam._checks import Bools, Floats, Ints
-from dqslam.association import CHI2_GATE, FINAL
+from dqslam.association import CHI2_GATE, FINAL, RepeatedNoise
 from dqslam.assumptions import BoxNoise, OdometryNoise, SizePrior, SizePriors
 from dqslam.calibration import CalibrationFinding
 from dqslam.estimate import Estimate
@@ -20,6 +20,7 @@ from dqslam.pipeline.lens import detections_with_exact_boxes
 from dqslam.pipeline.options import RunOptions
 from dqslam.pipeline.report import (
     box_chi2,
+    describe_box_noise,
     describe_boxes,
     describe_objects,
     describe_size_prior,
@@ -27,6 +28,8 @@ from dqslam.pipeline.report import (
     describe_times,
     warn_of_boxes,
     warn_of_calibration,
+    warn_of_evidence,
+    warn_of_sizes,
 )
 from dqslam.recording import Detections
 from dqslam.uncertainty import Marginals
@@ -52,6 +55,12 @@ class EstimatorOutput:
     """What was believed in the end."""
     odometry_noise: OdometryNoise | None
     """Root mean square of a step, where it was estimated."""
+    object_noise: tuple[BoxNoise, ...] = ()
+    """Of the boxes of each mapped object, where it was estimated."""
+    repeated: RepeatedNoise | None = None
+    """What of the boxes' noise repeats from image to image, where that was estimated."""
+    evidence: dict[str, Any] | None = None
+    """What boxes that took no part say for the estimate, against the odometry."""
     noise_levels: dict[str, float] = field(default_factory=dict)
     """Of its components: meters and radians a step, and shares of length and angle."""
     remarks: tuple[str, ...] = ()
@@ -105,7 +114,7 @@ def conclude(
         replace(boxes, object_id=object_id),
     )
     assigned = detections.select((object_id >= 0) & ~held_out)
-    chi2 = box_chi2(estimate, assigned, output.box_noise)
+    chi2 = box_chi2(estimate, assigned, output.object_noise or output.box_noise)
     mapped = np.isin(assigned.object_id, estimate.object_ids)
     tests_held_out = bool(held_out.any())
     tested = detections.select(held_out if tests_held_out else ~held_out)
@@ -119,6 +128,8 @@ def conclude(
         "warnings": [
             *output.remarks,
             *doubts,
+            *warn_of_evidence(output.evidence),
+            *warn_of_sizes(estimate, output.size_prior),
             *warn_of_calibration(output.calibration),
         ],
         "doubts": doubts,
@@ -130,11 +141,12 @@ def conclude(
             "of_dropped_objects": int(np.sum(~mapped)),
             "unassigned": int(np.sum(output.object_id < 0)),
         },
-        "objects": describe_objects(estimate, assigned, chi2),
+        "objects": describe_objects(estimate, assigned, chi2, output.marginals),
         "dropped_objects": {str(name): why for name, why in estimate.dropped.items()},
         "size_prior": describe_size_prior(output.size_prior),
         "reprojection": describe_overlap(overlap) | {"held_out": tests_held_out},
-        "box_noise": asdict(output.box_noise),
+        "box_noise": describe_box_noise(output.box_noise, output.repeated),
+        "evidence": output.evidence,
         "odometry_noise": {"from": "given"}
         if noise is None
         else {"from": "estimated"} | asdict(noise) | {"levels": output.noise_levels},

@@ -26,8 +26,8 @@ class RunOptions:
     mode: _core.Mode = _core.Mode.SLAM
     """SLAM improves the odometry; MAPPING takes it for the truth."""
     box_noise: BoxNoise | None = None
-    """How far the edges of boxes are off. None is ``BoxNoise()``, or more if the noise is estimated
-    and the boxes turn out to be worse."""
+    """How far the edges of boxes are off, anew in each image. None begins with ``BoxNoise()``, and
+    estimates in the end how far they are off, and what of that repeats from view to view."""
     size_prior: SizePrior | SizePriors | None = None
     """How large objects are, all of them or by class; None learns one size from those found."""
     estimates_noise: bool = False

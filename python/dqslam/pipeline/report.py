@@ -2,28 +2,37 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dqslam import _core
-from dqslam.association import CHI2_GATE
+from dqslam.association import CHI2_GATE, FinalEstimate, RepeatedNoise
 from dqslam.assumptions import BoxNoise, SizePrior, SizePriors
 from dqslam.calibration import CalibrationFinding
 from dqslam.estimate import Estimate
 from dqslam.recording import Detections
+from dqslam.uncertainty import Marginals
 
 # A map that fewer boxes show is worth a warning.
 ENOUGH_EXPLAINED = 0.5
+# An axis is odd that is so many standard deviations of the logarithm from the usual one: with 0.7,
+# the spread of a recording, eight times as long or as short.
+MOST_SIZE_SIGMAS = 3.0
 # Score tests take the errors of boxes for independent. Those of real detectors are not.
 SURE_OF_CALIBRATION = 10.0  # sigmas
 
 
-def box_chi2(estimate: Estimate, detections: Detections, noise: BoxNoise) -> NDArray[np.float64]:
+def box_chi2(
+    estimate: Estimate, detections: Detections, noise: BoxNoise | Sequence[BoxNoise]
+) -> NDArray[np.float64]:
     """Compare boxes with the estimate: chi-square with 4 dof, shape (m,).
 
-    Infinite where the object is not in front of the camera that saw it, no ellipsoid, or dropped.
+    ``noise`` is that of all boxes, or one for each object of the estimate. Infinite where the
+    object is not in front of the camera that saw it, no ellipsoid, or dropped.
     """
     if not len(estimate.object_ids):
         return np.full(len(detections), np.inf)
@@ -31,13 +40,17 @@ def box_chi2(estimate: Estimate, detections: Detections, noise: BoxNoise) -> NDA
         max=len(estimate.object_ids) - 1
     )
     mapped = estimate.object_ids[row] == detections.object_id
+    noises = [noise] * len(estimate.object_ids) if isinstance(noise, BoxNoise) else noise
+    covariance = np.zeros((len(detections), 4, 4))
+    for number, one in enumerate(noises):
+        covariance[row == number] = one.covariance(detections.box[row == number], estimate.camera)
     chi2 = _core.box_chi_squares(
         estimate.pose_model,
         estimate.camera,
         estimate.poses[detections.pose],
         estimate.ellipsoids[row],
         detections.box,
-        noise.covariance(detections.box, estimate.camera).reshape(-1, 16),
+        covariance.reshape(-1, 16),
         detections.truncated,
     )
     return np.where(mapped, chi2, np.inf)
@@ -65,25 +78,90 @@ def warn_of_boxes(count: int, explained: int) -> list[str]:
     ]
 
 
+def warn_of_sizes(estimate: Estimate, prior: SizePrior | SizePriors) -> list[str]:
+    """Warn of objects with an axis that is far from the sizes that are expected of their class."""
+    warnings = []
+    for row, name in enumerate(estimate.class_names):
+        expected, axes = prior.of(name), estimate.semi_axes[row]
+        off = np.abs(np.log(axes) - expected.log_mean) / expected.log_sigma
+        if off.max() > MOST_SIZE_SIGMAS:
+            size = " x ".join(f"{2.0 * axis:.2g}" for axis in axes)
+            warnings.append(
+                f"object {estimate.object_ids[row]} ({name}) is {size} m, where "
+                f"{2.0 * np.exp(expected.log_mean):.2g} m is usual: its boxes leave its shape "
+                "open, or show more than one thing"
+            )
+    return warnings
+
+
 def warn_of_calibration(findings: tuple[CalibrationFinding, ...]) -> list[str]:
     """Warn of deviations from the calibration that even repeated errors of boxes do not explain."""
     return [str(finding) for finding in findings if finding.sigmas > SURE_OF_CALIBRATION]
 
 
+def describe_box_noise(noise: BoxNoise, repeated: RepeatedNoise | None) -> dict[str, Any]:
+    """Describe the noise of an edge, and its parts where they were estimated."""
+    if repeated is None:
+        return asdict(noise)
+    parts = {"new": asdict(repeated.new), "repeated": asdict(repeated.repeated)}
+    return asdict(noise) | parts | {"correlation_angle_rad": repeated.angle}
+
+
+def describe_evidence(final: FinalEstimate, path: NDArray[np.float64]) -> dict[str, Any]:
+    """Say whether boxes that took no part agree with the estimate, or with odometry (n, d)."""
+    known = final.gain[np.isfinite(final.gain)]
+    distance = np.linalg.norm(final.poses[:, :3] - path[:, :3], axis=1)
+    return {
+        "log_likelihood_gain": float(known.sum()) if len(known) else None,
+        "objects_for": int(np.sum(known > 0.0)),
+        "objects_against": int(np.sum(known < 0.0)),
+        "odometry_kept": final.keeps_odometry,
+        "rms_correction_m": float(np.sqrt(np.mean(distance**2))),
+    }
+
+
+def warn_of_evidence(evidence: dict[str, Any] | None) -> list[str]:
+    """Say that the boxes have not earned it."""
+    if evidence is None or not evidence["odometry_kept"]:
+        return []
+    return [
+        "the odometry is kept: it explains the boxes of objects that took no part as well as the "
+        f"estimate does (log likelihoods differ by {evidence['log_likelihood_gain']:.3g})"
+    ]
+
+
 def describe_objects(
-    estimate: Estimate, detections: Detections, chi2: NDArray[np.float64]
+    estimate: Estimate,
+    detections: Detections,
+    chi2: NDArray[np.float64],
+    marginals: Marginals | None,
 ) -> list[dict[str, Any]]:
-    """Describe the boxes of each object."""
+    """Describe the place of each object, its size and its boxes."""
+    centers = np.full((len(estimate.object_ids), 3, 3), np.nan)
+    if marginals is not None:
+        centers = marginals.centers
     return [
         {
             "id": int(object_id),
             "class_name": estimate.class_names[row],
             "observations": int(estimate.observations[row]),
             "ellipsoid": bool(estimate.is_ellipsoid[row]),
+            "center_m": estimate.centers[row].tolist(),
+            "semi_axes_m": _numbers(estimate.semi_axes[row]),
+            "center_sigma_m": _number(np.sqrt(np.trace(centers[row]))),
             **describe_boxes(chi2[detections.object_id == object_id]),
         }
         for row, object_id in enumerate(estimate.object_ids)
     ]
+
+
+def _number(value: float) -> float | None:
+    """Return a number for JSON, which knows no NaN."""
+    return float(value) if np.isfinite(value) else None
+
+
+def _numbers(values: NDArray[np.float64]) -> list[float | None]:
+    return [_number(value) for value in values]
 
 
 def describe_size_prior(prior: SizePrior | SizePriors) -> dict[str, Any]:
