@@ -19,22 +19,24 @@ using Motion = Eigen::Matrix<double, Pose::kSize, 1>;
 template <typename Pose>
 constexpr int kDimension = Pose::kModel == PoseModel::kSe2 ? 2 : 3;
 
+// The motion with the smallest sum of squared distances. (Umeyama 1991)
 template <typename Pose>
 Motion<Pose> Fit(const std::vector<PlacePair>& pairs, const std::vector<size_t>& rows) {
-  constexpr int m = kDimension<Pose>;
-  Eigen::MatrixXd seen(m, rows.size());
-  Eigen::MatrixXd known(m, rows.size());
+  Eigen::Matrix<double, 3, Eigen::Dynamic> seen(3, rows.size()), known(3, rows.size());
   for (size_t i = 0; i < rows.size(); ++i) {
-    seen.col(i) = pairs[rows[i]].seen.head<m>();
-    known.col(i) = pairs[rows[i]].known.head<m>();
+    seen.col(i) = pairs[rows[i]].seen;
+    known.col(i) = pairs[rows[i]].known;
   }
-  const Eigen::MatrixXd motion = Eigen::umeyama(seen, known, false);
   Motion<Pose> result;
-  if constexpr (m == 2) {
-    result << motion(0, 2), motion(1, 2), std::atan2(motion(1, 0), motion(0, 0));
-  } else {
+  if constexpr (Pose::kModel == PoseModel::kSe3) {
+    const Eigen::Matrix4d motion = Eigen::umeyama(seen, known, false);
     const Eigen::Matrix3d rotation = motion.topLeftCorner<3, 3>();
     result << motion.topRightCorner<3, 1>(), Eigen::Quaterniond(rotation).coeffs();
+  } else {
+    const Eigen::Vector3d from = seen.rowwise().mean(), to = known.rowwise().mean();
+    const Eigen::Matrix3d sum = (seen.colwise() - from) * (known.colwise() - to).transpose();
+    const double angle = std::atan2(sum(0, 1) - sum(1, 0), sum(0, 0) + sum(1, 1));
+    result << to.head<2>() - Eigen::Rotation2Dd(angle) * from.head<2>(), angle;
   }
   return result;
 }

@@ -42,6 +42,27 @@ void LoopClosing<Pose>::Drift() {
 }
 
 template <typename Pose>
+void LoopClosing<Pose>::Known() {
+  const int pose = history_.num_poses() - 1;
+  progress_.drift.setZero();
+  if (pose - progress_.known > options_.loop_absence) {
+    progress_.adrift = progress_.known;
+    progress_.found = pose;
+  }
+  progress_.known = pose;
+}
+
+template <typename Pose>
+int LoopClosing<Pose>::Begin(int loop_begin) const {
+  const int end = history_.num_poses();
+  const int absence = progress_.found - progress_.adrift;
+  const bool was_adrift =
+      end - progress_.found <= absence || end - progress_.known > options_.loop_absence;
+  const int least = end - options_.long_smoothing.poses;
+  return std::max(loop_begin, was_adrift ? std::min(progress_.adrift, least) : least);
+}
+
+template <typename Pose>
 double LoopClosing<Pose>::DriftAngle(const Object& object) const {
   constexpr int rotations = Pose::kModel == PoseModel::kSe2 ? 1 : 3;
   const Surface<double> surface = SurfaceOf(object.center_shape);

@@ -25,7 +25,12 @@ class LoopClosing {
   /// Adds the step to the last pose to the drift.
   void Drift();
   /// Registers that the last pose observes an object of the map from before an absence.
-  void Known() { progress_.drift.setZero(); }
+  void Known();
+
+  /// The first pose that is minimized for a loop that begins at a pose.  It is later if the last
+  /// poses have been known for long, so that the work is bounded: an object that was not seen for
+  /// hours closes no loop of hours then.
+  int Begin(int loop_begin) const;
 
   /// Whether an observation must be deferred: its object comes back after an absence, and is not
   /// where the present pose shows it.
@@ -46,6 +51,9 @@ class LoopClosing {
     size_t deferred = 0;            ///< number of deferred observations at the last attempt
     int next_attempt = 0;           ///< pose
     int wait = 1;                   ///< poses until the attempt after it
+    int known = 0;                  ///< the last known pose
+    int adrift = 0;                 ///< the known pose before the last absence of all objects
+    int found = 0;                  ///< the known pose after it
   };
   const Progress& progress() const { return progress_; }
   void set_progress(const Progress& progress) { progress_ = progress; }

@@ -242,7 +242,8 @@ class SessionOf : public Session {
 
   // Objects in a wrong place are started again, and all is minimized once more.
   void SmoothBeyond(int window_begin, const Smoothing& smoothing, StepReport* report) {
-    const int begin = std::max(smoothing.begin, FirstOfLast(num_poses()));
+    int begin = std::max(smoothing.begin, FirstOfLast(num_poses()));
+    if (smoothing.closes_loop) begin = std::min(loops_.Begin(begin), window_begin);
     double damping = kFirstDamping;
     bool has_changed = true;
     for (int round = 0; round < smoothing.rounds && has_changed; ++round) {
