@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <limits>
 #include <string>
 #include <vector>
@@ -123,6 +124,27 @@ TYPED_TEST(SessionTest, PosesAtSomeRows) {
   EXPECT_EQ(session->PosesAt(IndexVector()).rows(), 0);
   EXPECT_THROW(session->PosesAt(Eigen::Vector2i(0, 40)), std::out_of_range);
   EXPECT_THROW(session->PosesAt(Eigen::Vector2i(-1, 0)), std::out_of_range);
+}
+
+// What is older than the longest smoothing is not linearized again: the twelfth lap takes no more
+// work than the fifth, though all laps see the same objects.
+TYPED_TEST(SessionTest, TheWorkOfAStepDoesNotGrow) {
+  constexpr int kLap = 30;
+  this->scene_ = MakeScene<TypeParam>(12 * kLap, 12.0);
+  this->Disturb(1, 0.01);
+  OnlineOptions options;
+  options.short_smoothing = {15, 5, 2};
+  options.medium_smoothing = {25, 10, 2};
+  options.long_smoothing = {40, 30, 1};
+  auto session = this->Begin(options);
+  std::vector<int> most(12, 0);
+  for (int pose = 0; pose < 12 * kLap; ++pose) {
+    const StepReport report = this->Add(session.get(), pose, kNone, kAll);
+    int& work = most[pose / kLap];
+    work = std::max(work, report.linearized + report.smoothed_observations);
+  }
+  EXPECT_GT(most[4], 0);
+  EXPECT_LE(*std::max_element(most.begin() + 5, most.end()), 1.5 * std::max(most[3], most[4]));
 }
 
 }  // namespace
