@@ -54,9 +54,8 @@ void ExpectDerivatives(double distance, bool is_box, bool truncated) {
     if (!is_box) observation.value << 1, 2, 3, 0;
     for (int i = 0; i < 4; ++i) observation.value[i] += (is_box ? 20 : 1) * normal(random);
     if (!is_box) observation.value[3] = 0;
-    observation.sqrt_information =
-        Eigen::Matrix4d::Identity() +
-        0.3 * Eigen::Matrix4d::NullaryExpr([&] { return normal(random); });
+    const Eigen::Matrix4d W = Eigen::Matrix4d::NullaryExpr([&] { return normal(random); });
+    observation.SetSqrtInformation(Eigen::Matrix4d::Identity() + 0.3 * W);
     if (truncated) observation.truncated << true, false, true, false;
     const auto station = [&](const typename History<Pose>::Storage& at) {
       return Station::At<Pose>(at.data(), model.mount);
@@ -127,13 +126,13 @@ TEST(Linearize, IsTheBoxCost) {
   EllipsoidFromCenterShape(center_shape.data(), ellipsoid.data());
   Observation observation{};
   observation.value << 250, 200, 380, 290;
-  observation.sqrt_information = Eigen::Vector4d(1, 2, 3, 4).asDiagonal();
+  observation.SetSqrtInformation(Eigen::Vector4d(1, 2, 3, 4).asDiagonal());
   observation.truncated.setConstant(false);
   const BoxCost<Se3, EllipsoidModel> cost{{},
                                           camera,
                                           Mount(camera),
                                           observation.value,
-                                          observation.sqrt_information,
+                                          observation.SqrtInformation(),
                                           observation.truncated};
   Eigen::Vector4d expected;
   ASSERT_TRUE(cost(pose.data(), ellipsoid.data(), expected.data()));
@@ -151,7 +150,7 @@ TEST(Linearize, EdgesThatFitExactlyHaveDerivatives) {
   const Vector9d center_shape = MakeObject(6);
   const Station station = Station::At<Se3>(pose.data(), model.mount);
   Observation observation{};
-  observation.sqrt_information.setIdentity();
+  observation.SetSqrtInformation(Eigen::Matrix4d::Identity());
   observation.truncated << true, false, false, false;
   ASSERT_TRUE(ProjectToBox(
       ToCamera(station.camera, SurfaceOf(center_shape)), model.camera, &observation.value));
@@ -169,7 +168,7 @@ TEST(Linearize, WeighsByTheCauchyLoss) {
   const Vector9d center_shape = MakeObject(6);
   Observation observation{};
   observation.value << 250, 200, 380, 290;
-  observation.sqrt_information.setIdentity();
+  observation.SetSqrtInformation(Eigen::Matrix4d::Identity());
   observation.truncated.setConstant(false);
   LinearizedObservation<Se2> all, weighed;
   const Station station = Station::At<Se2>(pose.data(), plain.mount);

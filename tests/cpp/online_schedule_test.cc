@@ -78,15 +78,6 @@ TEST(Schedule, EachLevelHasItsNumbers) {
           {80, 80, 4}, {156, 90, 4}, {175, 20, 2}, {182, 20, 2}, {189, 20, 2}, {191, 50, 3}}));
 }
 
-TEST(Schedule, SmoothingsAreShorterWhereManyObjectsAre) {
-  Schedule schedule{OnlineOptions()};
-  schedule.SmoothedWith(640, 80);  // twice as many as there is room for: a quarter of the poses
-  EXPECT_EQ(1000 - schedule.Choose(Window(1000)).begin, 512);
-  EXPECT_EQ(1128 - schedule.Choose(Window(1128)).begin, 160);
-  schedule.SmoothedWith(640, 1000);  // never fewer than a short one has
-  EXPECT_EQ(1256 - schedule.Choose(Window(1256)).begin, 64);
-}
-
 TEST(Schedule, ALoopThatDoesNotFitFreesAllPosesSinceItsObjectWasSeen) {
   Schedule schedule{OnlineOptions()};
   EXPECT_FALSE(schedule.WatchLoop(300, 428, 428));  // 128 poses are no absence

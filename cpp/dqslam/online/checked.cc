@@ -31,7 +31,7 @@ std::vector<Observation> CheckedObservations(const StepObservations& given, int 
     Observation& box = observations.emplace_back();
     box.object = given.object[row];
     box.value = given.box.row(row).transpose();
-    box.sqrt_information = SqrtInformationOfRow<4>("box_covariance", given.covariance, row);
+    box.SetSqrtInformation(SqrtInformationOfRow<4>("box_covariance", given.covariance, row));
     box.truncated = given.truncated.row(row);
   }
   for (const MeasurementTable& table : given.measurements) {

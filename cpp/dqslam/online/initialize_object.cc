@@ -28,7 +28,7 @@ Vector9d ObjectProblem<Pose>::Initialize() const {
   const Observation& first = *observations_.front();
   const Station& station = stations_.front();
   if (first.IsBox()) {
-    const View view{station.camera, first.value, first.sqrt_information, first.truncated};
+    const View view{station.camera, first.value, first.SqrtInformation(), first.truncated};
     return CenterShapeFromEllipsoid(BackProject(model_.camera, {view}, object_.size));
   }
   const Rigid<double>& robot = station.world_from_robot;
@@ -42,7 +42,7 @@ Vector9d ObjectProblem<Pose>::Reinitialize(bool by_size) const {
   for (size_t i = 0; i < observations_.size(); ++i) {
     const Observation& one = *observations_[i];
     if (!one.IsBox()) continue;
-    views.push_back({stations_[i].camera, one.value, one.sqrt_information, one.truncated});
+    views.push_back({stations_[i].camera, one.value, one.SqrtInformation(), one.truncated});
   }
   if (views.empty()) return object_.center_shape;
   return CenterShapeFromEllipsoid(by_size ? BackProject(model_.camera, views, object_.size)

@@ -109,7 +109,7 @@ auto VisitMeasurement(const Observation& observation, Visit&& visit) {
     using Cost = typename decltype(tag)::Cost;
     constexpr int m = Cost::kResidualSize;
     return visit(
-        Cost{{}, observation.value.head<m>(), observation.sqrt_information.topLeftCorner<m, m>()});
+        Cost{{}, observation.value.head<m>(), observation.SqrtInformation().topLeftCorner<m, m>()});
   });
 }
 
@@ -166,7 +166,7 @@ double CostOfObservation(const Model& model,
   if (!ErrorsOf<false>(model.camera, observation, in_camera, depth, &error, nullptr)) {
     return *chi_square;
   }
-  *chi_square = (observation.sqrt_information * error).squaredNorm();
+  *chi_square = (observation.SqrtInformation() * error).squaredNorm();
   double cost, loss;
   Weigh(model.loss_scale, *chi_square, &cost, &loss);
   return cost;
@@ -184,7 +184,7 @@ void Linearize(const Model& model,
     return;
   }
   const Unpacked<CenterShapeModel> object(center_shape);
-  const Eigen::Matrix4d& W = observation.sqrt_information;
+  const Eigen::Matrix4d W = observation.SqrtInformation();
   linear->residual = W * LinearizeBox(model, station, observation, object, edges, linear);
   linear->chi_square = linear->residual.squaredNorm();
   double loss;

@@ -1,9 +1,23 @@
 // What was estimated elsewhere, taken over by a history that has gone on meanwhile.
+#include <algorithm>
 #include <stdexcept>
 
+#include "dqslam/estimation/bend_path.h"
 #include "dqslam/online/history.h"
 
 namespace dqslam::online {
+
+template <typename Pose>
+bool History<Pose>::IsElsewhere(const Object& object, const Observation& observation) const {
+  if (!observation.IsBox()) return false;
+  Eigen::Vector4d box;
+  const Surface<double> in_camera =
+      ToCamera(StationAt(observation.pose).camera, SurfaceOf(object.center_shape));
+  if (!ProjectToBox(in_camera, model.camera, &box)) return true;
+  const Eigen::Vector4d& seen = observation.value;
+  return std::max(box[0], seen[0]) > std::min(box[2], seen[2]) ||
+         std::max(box[1], seen[1]) > std::min(box[3], seen[3]);
+}
 
 template <typename Pose>
 void History<Pose>::Merge(const RowMatrix& estimated_poses, const RowMatrix& ellipsoids) {
@@ -22,23 +36,25 @@ void History<Pose>::Merge(const RowMatrix& estimated_poses, const RowMatrix& ell
     Pose::Between(old.data(), poses[row].data(), relative.data());
     poses[row] = Compose(now, relative);
   }
-  const Rigid<double> before = Pose::WorldFromRobot(old.data());
-  const Rigid<double> after = Pose::WorldFromRobot(now.data());
-  const Eigen::Matrix3d turn = after.rotation * before.rotation.transpose();
   for (int row = 0; row < num_objects(); ++row) {
-    objects[row].is_stale = true;
+    objects[row].Unsettle();
     Vector9d& center_shape = objects[row].center_shape;
     if (row < ellipsoids.rows()) {
       center_shape = CenterShapeFromEllipsoid(ellipsoids.row(row).transpose());
       continue;
     }
-    Surface<double> surface = SurfaceOf(center_shape);
-    surface.center = turn * (surface.center - before.translation) + after.translation;
-    surface.shape = turn * surface.shape * turn.transpose();
-    center_shape = CenterShapeFromSurface(surface);
+    center_shape =
+        CenterShapeFromSurface(MoveWith<Pose>(old.data(), now.data(), SurfaceOf(center_shape)));
+  }
+  for (const Object& object : objects) {
+    for (const int row : std::vector<int>(object.deferred)) {
+      if (!IsElsewhere(object, observations[row])) Use(row);
+    }
   }
 }
 
+template bool History<Se2>::IsElsewhere(const Object&, const Observation&) const;
+template bool History<Se3>::IsElsewhere(const Object&, const Observation&) const;
 template void History<Se2>::Merge(const RowMatrix&, const RowMatrix&);
 template void History<Se3>::Merge(const RowMatrix&, const RowMatrix&);
 

@@ -66,9 +66,10 @@ std::vector<Relabeled> Relabel(const NewLabels& given, History<Pose>* history) {
   for (Eigen::Index row = 0; row < given.observation.size(); ++row) {
     Observation& observation = history->observations[given.observation[row]];
     if (observation.object == given.object[row]) continue;
-    if (!observation.Waits()) added[observation.object];
+    if (observation.is_deferred) history->Use(given.observation[row]);
+    if (observation.object >= 0) added[observation.object];
     observation.object = given.object[row];
-    if (!observation.Waits()) added[observation.object].push_back(given.observation[row]);
+    if (observation.object >= 0) added[observation.object].push_back(given.observation[row]);
   }
   std::vector<Relabeled> changed;
   for (auto& [row, rows] : added) {
@@ -82,7 +83,7 @@ std::vector<Relabeled> Relabel(const NewLabels& given, History<Pose>* history) {
         object.observations.begin(), object.observations.end(), std::back_inserter(kept), is_own);
     std::merge(kept.begin(), kept.end(), rows.begin(), rows.end(), std::back_inserter(all));
     object.observations = all;
-    object.is_stale = true;
+    object.Unsettle();
     changed.push_back(LongestNewAbsence(*history, row, kept, all));
   }
   return changed;

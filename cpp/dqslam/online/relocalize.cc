@@ -168,15 +168,16 @@ class Search {
   Observation Blurred(const Station& station, const Match& match) const {
     Observation box = boxes_[match.first];
     box.object = match.second;
-    box.sqrt_information.setIdentity();
+    box.SetSqrtInformation(Eigen::Matrix4d::Identity());
     LinearizedObservation<Pose> linear;
     Linearize(model_, station, box, objects_[box.object], EdgeResidual::kBox, &linear);
     const auto& J = linear.by_object;
     const Eigen::Matrix4d total = noise_[match.first] + J * spread_[box.object] * J.transpose();
     const Eigen::LLT<Eigen::Matrix4d> cholesky(total);
-    box.sqrt_information = cholesky.info() == Eigen::Success
-                               ? cholesky.matrixL().solve(Eigen::Matrix4d::Identity())
-                               : SqrtInformation<4>(noise_[match.first]);
+    box.SetSqrtInformation(
+        cholesky.info() == Eigen::Success
+            ? Eigen::Matrix4d(cholesky.matrixL().solve(Eigen::Matrix4d::Identity()))
+            : SqrtInformation<4>(noise_[match.first]));
     return box;
   }
 

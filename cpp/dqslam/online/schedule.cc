@@ -5,7 +5,6 @@
 namespace dqslam::online {
 namespace {
 
-constexpr double kFrontObjects = 40;  // that a smoothing of full length has room for
 // A young session has a medium smoothing whenever it has grown by this share, after so many steps.
 constexpr int kGrowth = 4, kSoonest = 16;
 constexpr double kMostCredit = 3;
@@ -40,12 +39,11 @@ Smoothing Schedule::Choose(const WindowFit& window) {
   const SmoothingLevel& long_level = options_.long_smoothing;
   if (end >= std::max(next_medium_, kSoonest)) {
     next_medium_ = end + std::min(std::max(end / kGrowth, kSoonest), medium_level.every);
-    const int poses = Shortened(medium_level.poses), more = Shortened(long_level.poses);
-    if (end < std::max(next_long_, long_level.every) || more <= poses) {
-      return {last(poses), medium_level.iterations};
+    if (end < std::max(next_long_, long_level.every)) {
+      return {last(medium_level.poses), medium_level.iterations};
     }
     next_long_ = end + long_level.every;
-    return {last(more), long_level.iterations, 1};
+    return {last(long_level.poses), long_level.iterations, 1};
   }
   if (end % options_.short_smoothing.every == 0) {
     return {last(options_.short_smoothing.poses), options_.short_smoothing.iterations};
@@ -62,16 +60,6 @@ bool Schedule::ClosesLoop(const WindowFit& window) {
   loop_until_ = -1;
   loop_misfits_ = false;
   return true;
-}
-
-void Schedule::SmoothedWith(int poses, int objects_in_front) {
-  if (poses > options_.short_smoothing.poses) front_objects_ = objects_in_front;
-}
-
-int Schedule::Shortened(int poses) const {
-  const double square = front_objects_ * front_objects_ / (kFrontObjects * kFrontObjects);
-  const int fewer = static_cast<int>(poses / std::max(square, 1.0));
-  return std::max(fewer, std::min(options_.short_smoothing.poses, poses));
 }
 
 }  // namespace dqslam::online

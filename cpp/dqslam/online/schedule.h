@@ -36,13 +36,8 @@ class Schedule {
   /// Chooses the smoothing of a step.  It is called once per step.
   Smoothing Choose(const WindowFit& window);
 
-  /// Registers the size of a smoothing.  The work is quadratic in the objects of the front.  If
-  /// there are many, the next medium and long smoothings have fewer poses.
-  void SmoothedWith(int poses, int objects_in_front);
-
  private:
   bool ClosesLoop(const WindowFit& window);
-  int Shortened(int poses) const;
 
   OnlineOptions options_;
   int loop_begin_ = 0;         // the last pose from which the object was observed before
@@ -51,7 +46,6 @@ class Schedule {
   double loop_credit_ = 1;     // number of loops that may be closed now
   int next_medium_ = 0, next_long_ = 0;
   int next_recovery_ = 0;
-  double front_objects_ = 0;  // in the last smoothing that was longer than a short one
 };
 
 }  // namespace dqslam::online

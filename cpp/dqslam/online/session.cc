@@ -8,6 +8,7 @@
 #include "dqslam/geometry/dispatch.h"
 #include "dqslam/online/checked.h"
 #include "dqslam/online/initialize_object.h"
+#include "dqslam/online/loop_closing.h"
 #include "dqslam/online/relabel.h"
 #include "dqslam/online/schedule.h"
 #include "dqslam/online/window.h"
@@ -44,7 +45,10 @@ class SessionOf : public Session {
       : options_(options),
         history_(Model(camera, scene, options.loss_scale)),
         window_(&history_),
-        schedule_(options) {}
+        loops_(&history_, &window_, options),
+        schedule_(options) {
+    history_.settling = options.long_smoothing.poses;
+  }
 
   StepReport Add(const Eigen::VectorXd& relative,
                  const RowMatrix& covariance,
@@ -64,6 +68,7 @@ class SessionOf : public Session {
       history_.objects.emplace_back();
       history_.objects.back().size = {given.log_size_mean[row], given.log_size_sigma[row]};
     }
+    if (pose > 0) loops_.Drift();
     for (const Observation& observation : observations) Observe(observation);
     return Update();
   }
@@ -80,6 +85,7 @@ class SessionOf : public Session {
     copy->history_ = history_;
     copy->damping_ = damping_;
     copy->schedule_ = schedule_;
+    copy->loops_.set_progress(loops_.progress());
     return copy;
   }
 
@@ -159,10 +165,17 @@ class SessionOf : public Session {
  private:
   void Observe(const Observation& observation) {
     history_.observations.push_back(observation);
-    if (observation.Waits()) return;
+    if (observation.object < 0) return;
     Object& object = history_.objects[observation.object];
+    if (loops_.MustWait(object, observation)) {
+      object.observations.push_back(history_.num_observations() - 1);
+      history_.Defer(history_.num_observations() - 1);
+      return;
+    }
     if (!object.observations.empty()) {
       const int last = history_.observations[object.observations.back()].pose;
+      const int first = history_.observations[object.observations.front()].pose;
+      if (observation.pose - first > options_.loop_absence) loops_.Known();
       schedule_.WatchLoop(last, observation.pose, observation.pose);
     }
     object.observations.push_back(history_.num_observations() - 1);
@@ -200,6 +213,12 @@ class SessionOf : public Session {
     report.linearized = window.linearized;
     report.undefined = window.undefined;
     report.chi_square = window.residuals > 0 ? window.chi_square / window.residuals : 0;
+    if (const auto closed = loops_.Realign()) {
+      report.closed_loop = true;
+      report.smoothed_poses = closed->poses;
+      report.smoothed_observations = closed->linearized;
+      return report;
+    }
     const WindowFit fit{begin, num_poses(), report.chi_square, window.undefined};
     if (schedule_.Recovers(fit)) Recover(&report);
     const Smoothing smoothing = schedule_.Choose(fit);
@@ -223,16 +242,16 @@ class SessionOf : public Session {
 
   // Objects in a wrong place are started again, and all is minimized once more.
   void SmoothBeyond(int window_begin, const Smoothing& smoothing, StepReport* report) {
-    const int begin = std::max(smoothing.begin, FirstOfLast(num_poses()));
+    int begin = std::max(smoothing.begin, FirstOfLast(num_poses()));
+    if (smoothing.closes_loop) begin = std::min(loops_.Begin(begin), window_begin);
     double damping = kFirstDamping;
     bool has_changed = true;
     for (int round = 0; round < smoothing.rounds && has_changed; ++round) {
       const WindowResult result =
           round == 0 && smoothing.closes_loop
-              ? window_.CloseLoop(begin, window_begin, options_)
+              ? loops_.Minimize(begin, window_begin)
               : window_.Minimize(
                     begin, MarginalPriors::kRelinearize, smoothing.iterations, &damping);
-      schedule_.SmoothedWith(result.poses, result.front);
       report->smoothed_poses = result.poses;
       report->smoothed_observations += result.linearized;
       has_changed = false;
@@ -249,6 +268,7 @@ class SessionOf : public Session {
   OnlineOptions options_;
   History<Pose> history_;
   Window<Pose> window_;
+  LoopClosing<Pose> loops_;
   Schedule schedule_;
   double damping_ = kFirstDamping;  // of the window
 };

@@ -3,7 +3,7 @@
 // A step minimizes the last poses and the objects that were observed from them.  Earlier poses are
 // constant, and observations from them are kept as Gaussians on the objects.  Smoothings minimize
 // more poses from time to time.  If an object is observed again after an absence and does not fit,
-// all poses since its last observation are minimized.
+// all poses since its last observation are minimized, see loop_closing.h.
 #pragma once
 
 #include <memory>

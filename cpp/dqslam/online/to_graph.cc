@@ -14,7 +14,7 @@ std::vector<const Observation*> OfKind(const std::vector<Observation>& observati
                                        int kind) {
   std::vector<const Observation*> found;
   for (const Observation& one : observations) {
-    const bool takes_part = !one.Waits() && row_in_graph[one.object] >= 0;
+    const bool takes_part = one.object >= 0 && row_in_graph[one.object] >= 0;
     if (takes_part && one.kind == kind) found.push_back(&one);
   }
   return found;
@@ -34,7 +34,7 @@ void Fill(const std::vector<const Observation*>& observations,
   table->covariance.resize(count, m * m);
   for (Eigen::Index row = 0; row < count; ++row) {
     const Observation& one = *observations[row];
-    const Eigen::MatrixXd W = one.sqrt_information.topLeftCorner(m, m);
+    const Eigen::MatrixXd W = one.SqrtInformation().topLeftCorner(m, m);
     const Eigen::MatrixXd covariance = (W.transpose() * W).inverse();
     table->pose[row] = one.pose;
     table->object[row] = row_in_graph[one.object];

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <utility>
 
 #include "dqslam/costs/measurements.h"
 #include "dqslam/online/checkpoint.h"
@@ -23,15 +24,6 @@ constexpr int kFewestObservations = 3;
 // all leads up its wall: the next ones lead down again, far ahead of where small steps creep.
 constexpr int kPatience = 3;
 
-// The pose of no motion: where the prior of a first pose starts from.
-template <typename Pose>
-typename History<Pose>::Storage Identity() {
-  typename History<Pose>::Storage identity;
-  const double zero[Pose::kTangentSize] = {};
-  Pose::FromTangent(zero, identity.data());
-  return identity;
-}
-
 }  // namespace
 
 template <typename Pose>
@@ -45,16 +37,20 @@ WindowResult Window<Pose>::Minimize(int begin,
   end_ = history_.num_poses();
   if (begin_ >= end_) return result;
   Collect(marginal_priors, &result);
+  Couple();
   std::optional<Checkpoint<Pose>> checkpoint;  // where steps began to go uphill
   Fit fit_of_checkpoint;
   int uphill = 0;  // steps since the checkpoint
-  bool may_climb = true;
+  bool may_climb = true, has_moved = true;
   for (int iteration = 0; iteration < iterations; ++iteration) {
-    const bool possible = Linearize(*damping, edges, &result) && MakeTrial();
+    if (has_moved) Linearize(edges, &result);
+    has_moved = false;
+    const bool possible = MakeTrial(*damping);
     if (possible) FitTrial();
     const double before = uphill > 0 ? fit_of_checkpoint.cost : here_.cost;
     if (possible && there_.cost < before) {
       TakeTrial();
+      has_moved = true;
       *damping = std::max(*damping / 5, kLeastDamping);
       uphill = 0;
       may_climb = true;
@@ -68,18 +64,19 @@ WindowResult Window<Pose>::Minimize(int begin,
         fit_of_checkpoint = here_;
       }
       TakeTrial();
+      has_moved = true;
       continue;
     }
     if (uphill > 0) {
       checkpoint->Restore(&history_);
       here_ = fit_of_checkpoint;
+      has_moved = true;
     }
     uphill = 0;
     *damping = std::min(std::max(*damping, 1e-6) * 10, kMostDamping);
   }
   result.cost = here_.cost;
   result.chi_square = here_.chi_square;
-  result.front = chain_.most_objects();
   for (size_t i = 0; i < members_.size(); ++i) {
     const Member& member = members_[i];
     if (marginal_priors == MarginalPriors::kRelinearize)
@@ -98,7 +95,7 @@ void Window<Pose>::Collect(MarginalPriors marginal_priors, WindowResult* result)
   std::vector<int> member_of_object(history_.objects.size(), -1);
   for (int row = history_.ObservationsBefore(begin_); row < history_.num_observations(); ++row) {
     const Observation& observation = history_.observations[row];
-    if (observation.Waits()) continue;
+    if (!observation.IsUsed()) continue;
     int& number = member_of_object[observation.object];
     if (number < 0) {
       number = static_cast<int>(members_.size());
@@ -114,100 +111,121 @@ void Window<Pose>::Collect(MarginalPriors marginal_priors, WindowResult* result)
     object.is_stale = object.is_stale || marginal_priors == MarginalPriors::kRelinearize;
     result->linearized += history_.UpdateMarginalPrior(begin_, &object);
   }
-  trial_.assign(end_ - begin_ + 1, begin_ > 0 ? history_.poses[begin_ - 1] : Identity<Pose>());
+  trial_.assign(end_ - begin_ + 1,
+                begin_ > 0 ? history_.poses[begin_ - 1] : History<Pose>::Identity());
   result->poses = end_ - begin_;
   result->objects = static_cast<int>(members_.size());
   result->residuals += k * result->poses;
 }
 
+// Orders the equations, which depends only on what observes what.
 template <typename Pose>
-bool Window<Pose>::Linearize(double damping, EdgeResidual edges, WindowResult* result) {
-  chain_.Reset(damping);
-  for (Member& member : members_) member.slot = -1;
-  result->undefined = 0;
+void Window<Pose>::Couple() {
+  const int poses = end_ - begin_;
+  std::vector<int> sizes(poses, k);
+  sizes.resize(poses + members_.size(), 9);
+  std::vector<std::pair<int, int>> pairs;
+  for (int pose = 1; pose < poses; ++pose) pairs.emplace_back(pose - 1, pose);
+  for (const Seen& seen : seen_) {
+    pairs.emplace_back(seen.observation->pose - begin_, poses + seen.member);
+  }
+  BlockMatrix H(std::move(sizes), pairs);
+  BlockCholesky cholesky(H);
+  system_.emplace(System{{0, {}, std::move(H)}, std::move(cholesky)});
+}
+
+template <typename Pose>
+void Window<Pose>::Linearize(EdgeResidual edges, WindowResult* result) {
+  const int poses = end_ - begin_;
+  NormalEquations& equations = system_->equations;
+  BlockMatrix& H = equations.H;
+  H.SetZero();
+  equations.gradient = Eigen::VectorXd::Zero(H.rows());
+  Accumulator sum(&equations);
   here_.cost = here_.chi_square = 0;
   here_.of_member.assign(members_.size(), 0);
-  auto seen = seen_.begin();
-  for (int pose = begin_; pose < end_; ++pose) {
-    const double* from = (pose == begin_ ? trial_[0] : history_.poses[pose - 1]).data();
-    const double* at = history_.poses[pose].data();
-    const LinearizedStep<Pose> step = LinearizeStep<Pose>(history_.steps[pose], from, at);
+  size_t row = 0;
+  for (int pose = 0; pose < poses; ++pose) {
+    const double* from = (pose == 0 ? trial_[0] : history_.poses[begin_ + pose - 1]).data();
+    const double* at = history_.poses[begin_ + pose].data();
+    const LinearizedStep<Pose> step = LinearizeStep<Pose>(history_.steps[begin_ + pose], from, at);
     here_.chi_square += step.residual.squaredNorm();
-    if (pose == begin_) {  // from a constant pose
-      chain_.AddPose(step.by_to.transpose() * step.by_to, step.by_to.transpose() * step.residual);
-    } else if (!chain_.NextPose(step.residual, step.by_from, step.by_to) ||
-               !EliminateObjectsOf(pose - 1)) {
-      return false;
+    sum.AddDiagonal(pose, step.by_to, step.residual);
+    if (pose > 0) {  // else it is from a constant pose
+      sum.AddDiagonal(pose - 1, step.by_from, step.residual);
+      sum.AddOffDiagonal(H.index_of_pair(pose - 1), step.by_from, step.by_to);
     }
     if (model_.scene.camera_height_sigma > 0) {
       Eigen::Matrix<double, k, 1> jacobian;
       const double residual = LinearizeHeight<Pose>(model_, at, &jacobian);
-      chain_.AddPose(jacobian * jacobian.transpose(), jacobian * residual);
+      sum.AddDiagonal(pose,
+                      Eigen::Matrix<double, 1, k>(jacobian.transpose()),
+                      Eigen::Matrix<double, 1, 1>(residual));
       here_.cost += 0.5 * residual * residual;
     }
-    const Station station = history_.StationAt(pose);
-    for (; seen != seen_.end() && seen->observation->pose == pose; ++seen)
-      Linearize(station, edges, &*seen, result);
+    const Station station = history_.StationAt(begin_ + pose);
+    for (; row < seen_.size() && seen_[row].observation->pose == begin_ + pose; ++row)
+      AddObservation(station, edges, row, &sum);
+  }
+  for (size_t number = 0; number < members_.size(); ++number) {
+    const Object& object = history_.objects[members_[number].object];
+    GaussianPrior prior;
+    prior.H = object.marginal.H;
+    prior.g = object.marginal.GradientAt(object.center_shape);
+    here_.cost += object.marginal.CostAt(object.center_shape) +
+                  AddPriors(model_, object, object.center_shape, &prior);
+    const int block = poses + static_cast<int>(number);
+    Eigen::Map<Matrix9d>(H.Diagonal(block)) += prior.H;
+    equations.gradient.template segment<9>(H.offset(block)) += prior.g;
   }
   here_.cost += 0.5 * here_.chi_square;
-  return chain_.Finish() && std::isfinite(here_.cost);
+  const auto is_undefined = [](const Seen& seen) { return seen.depth > 0; };
+  result->undefined = static_cast<int>(std::count_if(seen_.begin(), seen_.end(), is_undefined));
+  result->linearized += static_cast<int>(seen_.size());
 }
 
 template <typename Pose>
-void Window<Pose>::Linearize(const Station& station,
-                             EdgeResidual edges,
-                             Seen* seen,
-                             WindowResult* result) {
-  Member& member = members_[seen->member];
-  const Object& object = history_.objects[member.object];
-  if (member.slot < 0) {
-    member.slot = chain_.AddObject(seen->member);
-    GaussianPrior sum;
-    sum.H = object.marginal.H;
-    sum.g = object.marginal.GradientAt(object.center_shape);
-    here_.cost += object.marginal.CostAt(object.center_shape) +
-                  AddPriors(model_, object, object.center_shape, &sum);
-    chain_.AddObjectInformation(member.slot, sum.H, sum.g);
-  }
+void Window<Pose>::AddObservation(const Station& station,
+                                  EdgeResidual edges,
+                                  size_t row,
+                                  Accumulator* sum) {
+  Seen& seen = seen_[row];
+  const Vector9d& center_shape = history_.objects[members_[seen.member].object].center_shape;
   LinearizedObservation<Pose> linear;
-  online::Linearize(model_, station, *seen->observation, object.center_shape, edges, &linear);
-  chain_.AddObservation(member.slot, linear.residual, linear.by_pose, linear.by_object);
+  online::Linearize(model_, station, *seen.observation, center_shape, edges, &linear);
+  const int poses = end_ - begin_;
+  const int pose = seen.observation->pose - begin_;
+  sum->AddDiagonal(pose, linear.by_pose, linear.residual);
+  sum->AddDiagonal(poses + seen.member, linear.by_object, linear.residual);
+  sum->AddOffDiagonal(
+      system_->equations.H.index_of_pair(poses - 1 + row), linear.by_pose, linear.by_object);
   here_.chi_square += 2 * linear.cost;
-  here_.of_member[seen->member] += linear.chi_square;
-  seen->depth = linear.depth;
-  result->undefined += linear.depth > 0;
-  ++result->linearized;
+  here_.of_member[seen.member] += linear.chi_square;
+  seen.depth = linear.depth;
 }
 
-// Eliminates the objects that a pose saw last.
+// Takes a damped Gauss-Newton step.  Returns false if there is none.
 template <typename Pose>
-bool Window<Pose>::EliminateObjectsOf(int pose) {
-  // Objects are in the order of their first observations, not their last: all are looked at, which
-  // costs little beside the elimination of the pose.
-  for (const Member& member : members_) {
-    if (member.last_pose == pose && member.slot >= 0 && !chain_.EliminateObject(member.slot)) {
-      return false;
-    }
+bool Window<Pose>::MakeTrial(double damping) {
+  const NormalEquations& equations = system_->equations;
+  if (!std::isfinite(here_.cost) ||
+      !system_->cholesky.Factorize(equations.H, damping * equations.H.diagonal())) {
+    return false;
   }
-  return true;
-}
-
-template <typename Pose>
-bool Window<Pose>::MakeTrial() {
-  int pose = end_;
+  const Eigen::VectorXd step = system_->cholesky.Solve(-equations.gradient);
+  if (!step.allFinite()) return false;
+  for (int pose = begin_; pose < end_; ++pose) {
+    trial_[pose - begin_ + 1] =
+        History<Pose>::Retract(history_.poses[pose], step.segment<k>(k * (pose - begin_)));
+  }
+  const int poses = end_ - begin_;
   bool possible = true;
-  chain_.BackSubstitute(
-      [&](const Eigen::Matrix<double, k, 1>& step) {
-        --pose;
-        trial_[pose - begin_ + 1] = History<Pose>::Retract(history_.poses[pose], step);
-        possible = possible && step.allFinite();
-      },
-      [&](int number, const Vector9d& step) {
-        Member& member = members_[number];
-        const Vector9d& center_shape = history_.objects[member.object].center_shape;
-        possible =
-            possible && step.allFinite() && RetractCenterShape(center_shape, step, &member.trial);
-      });
+  for (size_t number = 0; number < members_.size(); ++number) {
+    Member& member = members_[number];
+    possible = possible && RetractCenterShape(history_.objects[member.object].center_shape,
+                                              step.segment<9>(k * poses + 9 * number),
+                                              &member.trial);
+  }
   return possible;
 }
 

@@ -1,9 +1,11 @@
 // Minimization of the last poses and of all objects observed from them.  Older poses are constant.
 #pragma once
 
+#include <optional>
 #include <vector>
 
-#include "dqslam/linear/chain_elimination.h"
+#include "dqslam/linear/block_cholesky.h"
+#include "dqslam/linear/normal_equations.h"
 #include "dqslam/online/linearize.h"
 #include "dqslam/online/options.h"
 
@@ -20,7 +22,6 @@ enum class MarginalPriors { kKeep, kRelinearize };
 /// The work of a minimization, and the fit at its end.
 struct WindowResult {
   int poses = 0, objects = 0;
-  int front = 0;             ///< largest number of objects in the front of the elimination
   int linearized = 0;        ///< linearized observations of all iterations, also of older poses
   int undefined = 0;         ///< number of observations whose objects are not in front
   double chi_square = 0;     ///< of steps and observations of the window
@@ -51,13 +52,6 @@ class Window {
   /// reinitialize.cc.
   WindowResult Reinitialize(int begin, int iterations);
 
-  /// Minimizes all poses from `begin` on.  If an object does not fit then, there is a second
-  /// attempt, because box residuals do not lead to an object that is far from its boxes.  The poses
-  /// from `window_begin` on return to their odometry, and the objects to their states before.  The
-  /// new boxes of each object are at first one measurement of its position, and are used themselves
-  /// after that.  Keeps the result with the lowest cost.  In loop_closing.cc.
-  WindowResult CloseLoop(int begin, int window_begin, const OnlineOptions& options);
-
  private:
   static constexpr int k = Pose::kTangentSize;
   using Storage = typename History<Pose>::Storage;
@@ -66,7 +60,6 @@ class Window {
   struct Member {
     int object;
     int last_pose;         ///< from which it is observed
-    int slot = -1;         ///< slot in the chain, from its first observation on
     int observations = 0;  ///< number of them in the window
     Vector9d trial = Vector9d::Zero();
   };
@@ -85,17 +78,24 @@ class Window {
     std::vector<double> of_member;  ///< chi-square of the observations of each member
   };
 
+  /// The normal equations, and the factorization of their pattern.  Their blocks are the poses and
+  /// then the members, their coupled pairs the steps and then the observations.
+  struct System {
+    NormalEquations equations;
+    BlockCholesky cholesky;
+  };
+
   void Collect(MarginalPriors marginal_priors, WindowResult* result);
-  bool Linearize(double damping, EdgeResidual edges, WindowResult* result);
-  void Linearize(const Station& station, EdgeResidual edges, Seen* seen, WindowResult* result);
-  bool EliminateObjectsOf(int pose);
-  bool MakeTrial();
+  void Couple();
+  void Linearize(EdgeResidual edges, WindowResult* result);
+  void AddObservation(const Station& station, EdgeResidual edges, size_t row, Accumulator* sum);
+  bool MakeTrial(double damping);
   void FitTrial();
   void TakeTrial();
 
   History<Pose>& history_;
   const Model& model_;
-  ChainElimination<k> chain_;
+  std::optional<System> system_;
   int begin_ = 0, end_ = 0;
   std::vector<Member> members_;
   std::vector<Seen> seen_;      ///< in the order of their poses
