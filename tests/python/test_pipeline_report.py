@@ -88,7 +88,8 @@ def test_objects_have_a_place_a_size_and_a_sigma(files, orbit):
         assert 0.0 < entry["center_sigma_m"] < 0.1
 
 
-def test_evidence_for_an_estimate_and_against_it(files):
+def test_evidence_for_an_estimate_and_against_it(files, monkeypatch):
+    monkeypatch.setattr("dqslam.pipeline.batch.FEWEST_IMAGES_A_KEYFRAME", 0)
     recording, _ = load_recording(*files)
     noisy = run(perturb_odometry(recording, NOISE, seed=0)).report
     evidence = noisy["evidence"]

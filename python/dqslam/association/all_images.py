@@ -28,8 +28,6 @@ from dqslam.recording import Recording
 # The correlated problem is dense: so many images at most have their boxes in it, else the keyframes
 # have, or every other of them; with yet more keyframes, they are left to be independent.
 MOST_IMAGES = 150
-# With fewer images to a keyframe, the others have little to add to what the keyframes tell.
-FEWEST_IMAGES_A_KEYFRAME = 4
 # Where keyframes are left out, an object keeps all of its own if it would have fewer.
 ENOUGH_VIEWS = 6
 # Iterations that bring the images between the keyframes to where their boxes fit.
@@ -88,13 +86,9 @@ def estimate_all_images(
 
     Returns
     -------
-    The estimate; None where most images are keyframes, where there are too many images, or where
-    an object reaches a camera.
+    The estimate; None where there are too many images, or an object reaches a camera.
     """
     detections, model = recording.detections, recording.odometry.pose_model
-    boxed = np.unique(detections.pose[object_row >= 0])
-    if len(boxed) < FEWEST_IMAGES_A_KEYFRAME * len(keyframes):
-        return None
     images = _choose_images(keyframes, detections.pose, object_row)
     if len(images) < 2:
         return None

@@ -29,6 +29,8 @@ from dqslam.uncertainty import Marginals, UnderConstrained, marginal_covariances
 # Boxes are undistorted again for the map until they move by less than this [px], or so many times.
 _LENS_PX = 0.02
 _LENS_ROUNDS = 4
+# With fewer images to a keyframe, the others have little to add to what the keyframes tell.
+FEWEST_IMAGES_A_KEYFRAME = 3
 
 
 def estimate_batch(
@@ -118,12 +120,7 @@ def _finish(
         under_constrained=tuple(_named(part, found) for part in marginals.under_constrained),
     )
     final = None
-    # The boxes of a lens are exact only in the problem of the keyframes.
-    if (
-        solver.mode == _core.Mode.SLAM
-        and options.box_noise is None
-        and not recording.camera.has_distortion
-    ):
+    if solver.mode == _core.Mode.SLAM and options.box_noise is None:
         final = _use_all_images(recording, found, solved.poses, estimate)
     if final is not None:
         estimate = replace(
@@ -148,7 +145,15 @@ def _finish(
 def _use_all_images(
     recording: Recording, found: Association, poses: NDArray[np.float64], estimate: Estimate
 ) -> FinalEstimate | None:
-    """Estimate by all images, from the poses of keyframes (f, d) and the objects of an estimate."""
+    """Estimate by all images, from the poses of keyframes (f, d) and the objects of an estimate.
+
+    None where that has little to add, and where boxes come through a lens: these are exact only in
+    the problem of the keyframes.
+    """
+    images = np.unique(recording.detections.pose[found.object_id >= 0])
+    few = len(images) < FEWEST_IMAGES_A_KEYFRAME * len(found.keyframes)
+    if few or recording.camera.has_distortion:
+        return None
     place = np.searchsorted(estimate.object_ids, found.object_id)
     place = place.clip(max=len(estimate.object_ids) - 1)
     mapped = estimate.object_ids[place] == found.object_id
