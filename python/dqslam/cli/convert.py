@@ -64,6 +64,9 @@ def convert(
         frames=given_frame_times(frame_times, frame_rate),
         classes=None if classes is None else io.read_class_names(classes),
         body_from_camera=None if camera_in_body is None else io.read_mount(camera_in_body),
+        files=tuple(
+            one for one in (camera, frame_times, classes, camera_in_body) if one is not None
+        ),
     )
     with output.share("converting") as progress:
         written = io.convert(

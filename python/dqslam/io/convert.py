@@ -15,7 +15,7 @@ from dqslam.io.camera import CAMERA_FORMATS, read_camera
 from dqslam.io.camera.rosbag import KIND as CAMERA_INFO
 from dqslam.io.detections import DETECTION_FORMATS, DetectionTable, read_detections
 from dqslam.io.detections.rosbag import KIND as DETECTION_ARRAY
-from dqslam.io.files import FileError, whole_folder
+from dqslam.io.files import FileError, refuse_inputs, whole_folder
 from dqslam.io.formats import Format, Progress, choose_format, no_progress
 from dqslam.io.frames import BY_NUMBER, FrameTimes, write_frame_times
 from dqslam.io.rosbag import NAME as BAG
@@ -54,6 +54,7 @@ class ConvertContext:
     frames: FrameTimes | None = None
     classes: dict[int, str] | None = None
     body_from_camera: ArrayLike | None = None
+    files: tuple[Path, ...] = ()  #: the files that these were read from, never written over
 
 
 def convert(
@@ -84,9 +85,9 @@ def convert(
         Called with the share of a bag or a folder that has been read; not for other files.
     """
     source, out = Path(source), Path(out)
-    if out.exists() and source.exists() and out.samefile(source):
-        raise ValueError(f"{out}: the file would be written over itself")
     context = context or ConvertContext()
+    for file in (out, _frames_file(out)):
+        refuse_inputs(file, [source, *context.files])
     kind = _kind(source, format, to)
     if kind is not None:
         target = _target(out, to, kind)
@@ -241,6 +242,11 @@ def _beside(out: Path, target: Format[Any], frames: ArrayLike, times: ArrayLike)
     """Write the times into a file beside one whose format lacks them."""
     if "times" not in target.loses:
         return []
-    path = out.with_name(f"{out.stem}.frames.csv")
+    path = _frames_file(out)
     write_frame_times(path, frames, times)
     return [Written(path, "times of its frames, for --frame-times")]
+
+
+def _frames_file(out: Path) -> Path:
+    """Return the file of the times beside one whose format lacks them."""
+    return out.with_name(f"{out.stem}.frames.csv")

@@ -11,6 +11,7 @@ import numpy as np
 
 from dqslam import _core
 from dqslam._checks import Floats
+from dqslam._outputs import added_files, output_set
 from dqslam.io.camera.table import write_json_camera
 from dqslam.io.detections.csv import REQUIRED, write_csv
 from dqslam.io.detections.table import DetectionTable
@@ -19,6 +20,8 @@ from dqslam.io.step_covariances import write_step_covariances
 from dqslam.io.trajectory import write_trajectory
 from dqslam.recording import Recording, Truth
 
+TRUTH_FILES = ("groundtruth.txt", "objects.csv", "true_boxes.csv")
+
 
 def save_recording(recording: Recording, directory: str | Path) -> None:
     """Write camera.json, odometry.txt, odometry_covariance.csv and boxes.csv: see `load_recording`.
@@ -26,14 +29,23 @@ def save_recording(recording: Recording, directory: str | Path) -> None:
     The odometry is written as the poses that it leads to, world_from_camera. The id of an object is
     its track_id. Relative positions are left out, because no format has them.
 
+    The files of an earlier call are replaced, all at once if the directory has no others.
+
     Raises
     ------
     ValueError
         If the lens has distortion, because files have boxes of the image as it was recorded.
+    FileError
+        If the directory has files of these names that are others' or have been changed.
     """
+    with output_set(directory, "save_recording", beside_others=True) as folder:
+        write_recording(recording, folder)
+
+
+def write_recording(recording: Recording, directory: Path) -> None:
+    """Write the files of a recording into a folder that has none of them."""
     if recording.camera.has_distortion:
         raise ValueError("recording.camera: boxes of a lens with distortion cannot be written")
-    directory = Path(directory)
     odometry, boxes = recording.odometry, recording.detections
     path = _core.dead_reckon(odometry.pose_model, odometry.first_pose, odometry.relative)
     write_json_camera(directory / "camera.json", recording.camera)
@@ -58,9 +70,20 @@ def save_truth(truth: Truth, recording: Recording, directory: str | Path) -> Non
     """Write groundtruth.txt, objects.csv and true_boxes.csv, for `dqslam evaluate`.
 
     An object that is neither an ellipsoid nor a cuboid has the size of a cube of its volume, and no
-    orientation.
+    orientation. Files of an earlier call are replaced.
+
+    Raises
+    ------
+    FileError
+        If the directory has files of these names that are others' or have been changed.
     """
-    directory = Path(directory)
+    names = TRUTH_FILES if truth.box_object_id is not None else TRUTH_FILES[:2]
+    with added_files(directory, names, "save_truth") as folder:
+        write_truth(truth, recording, folder)
+
+
+def write_truth(truth: Truth, recording: Recording, directory: Path) -> None:
+    """Write the files of the truth into a folder that has none of them."""
     _write_path(directory / "groundtruth.txt", recording, truth.pose_model, truth.poses)
     names = ["object_id", "class_name", "x", "y", "z", "sx", "sy", "sz"]
     columns: list[Sequence[object]] = [truth.object_id.tolist(), truth.class_name]

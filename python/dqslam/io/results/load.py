@@ -12,12 +12,25 @@ import numpy as np
 
 from dqslam import _core
 from dqslam._checks import Bools, Floats, Ints, as_floats, as_ints
+from dqslam._exchange import standing
+from dqslam._manifest import check_files, complete_manifest, read_manifest
 from dqslam._repr import counted
 from dqslam.io.camera import read_camera
 from dqslam.io.files import FileError, read_text
 from dqslam.io.results.boxes import BoxTable, read_boxes
 from dqslam.io.results.covariances import read_covariances
 from dqslam.io.trajectory import read_trajectory
+
+RESULT_FILES = (
+    "trajectory.txt",
+    "odometry.txt",
+    "camera.json",
+    "map.json",
+    "covariance.csv",
+    "boxes.csv",
+    "report.json",
+)
+_MOST_READINGS = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,12 +115,15 @@ class Results:
 def load_results(directory: str | Path) -> Results:
     """Read a directory of results.
 
-    ``covariance.csv``, ``boxes.csv`` and ``report.json`` may be absent.
+    ``covariance.csv``, ``boxes.csv`` and ``report.json`` may be absent. If there is a
+    ``manifest.json``, the files are compared with it: for each that has been changed, added or
+    taken away since they were written, there is a ``ChangedFileWarning``.
 
     Raises
     ------
     FileError
-        If a file is missing or wrong; the error names it, and its line if it has lines.
+        If a file is missing or wrong; the error names it, and its line if it has lines. Or if the
+        manifest says that the writing of the files was interrupted.
 
     Examples
     --------
@@ -122,8 +138,24 @@ def load_results(directory: str | Path) -> Results:
     ((253, 7), (10, 3))
     """
     directory = Path(directory)
-    if not directory.is_dir():
-        raise FileError(directory, "no such directory")
+    for _ in range(_MOST_READINGS):
+        folder = standing(directory)
+        if not folder.is_dir():
+            raise FileError(directory, "no such directory")
+        before = complete_manifest(folder)
+        try:
+            found: Results | FileError = _read_results(folder)
+        except FileError as error:
+            found = error
+        if read_manifest(standing(directory)) == before:
+            break  # else another process has written new results meanwhile
+    if isinstance(found, FileError):
+        raise found
+    check_files(folder, RESULT_FILES)
+    return found
+
+
+def _read_results(directory: Path) -> Results:
     times, poses = read_trajectory(directory / "trajectory.txt")
     odometry_times, odometry = read_trajectory(directory / "odometry.txt")
     if not np.array_equal(times, odometry_times):
