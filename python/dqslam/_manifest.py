@@ -55,14 +55,22 @@ def read_manifest(folder: str | Path) -> Manifest | None:
     try:
         content = json.loads(read_text(path))
         files = {str(name): _hashes(found) for name, found in content["files"].items()}
-        folders = tuple(map(str, content.get("folders", ())))
+        folders = tuple(map(_plain_name, content.get("folders", ())))
         return Manifest(str(content["written_by"]), files, folders, content["complete"] is True)
-    except (json.JSONDecodeError, RecursionError, KeyError, TypeError, AttributeError):
+    except FileError:
+        raise
+    except (ValueError, RecursionError, KeyError, TypeError, AttributeError):
         raise FileError(path, "is not a manifest that dqslam has written") from None
 
 
 def _hashes(found: object) -> tuple[str, ...]:
     return tuple(map(str, found)) if isinstance(found, list) else (str(found),)
+
+
+def _plain_name(name: str) -> str:
+    if Path(name).name != name or name == "..":
+        raise ValueError(name)
+    return name
 
 
 def write_manifest(folder: Path, manifest: Manifest) -> None:

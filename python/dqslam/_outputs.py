@@ -74,7 +74,7 @@ def output_set(
     try:
         recover(folder)
         others = _check(folder, path, written_by, inputs, beside_others)
-        made = _make_parents(folder)
+        made = _make(folder)
         remove_stale_stages(folder)
         in_place = bool(others) or cannot_be_renamed(folder)
         stage, lock = new_stage(folder, inside=in_place)
@@ -155,9 +155,10 @@ def _listed(names: list[str]) -> str:
     return ", ".join(names[:_MOST_NAMED]) + more
 
 
-def _make_parents(folder: Path) -> list[Path]:
-    missing = [one for one in folder.parents if not one.exists()]
-    folder.parent.mkdir(parents=True, exist_ok=True)
+def _make(folder: Path) -> list[Path]:
+    """Make a folder, so that it is seen before the work that it can be made; return what is new."""
+    missing = [one for one in (folder, *folder.parents) if not one.exists()]
+    folder.mkdir(parents=True, exist_ok=True)
     return missing
 
 
@@ -185,6 +186,7 @@ def _commit(stage: Path, folder: Path, written_by: str, *, in_place: bool) -> No
             sync(os.path.join(inner, name))
         sync(inner)
     if not folder.exists() or not any(folder.iterdir()):
+        folder.parent.mkdir(parents=True, exist_ok=True)
         os.rename(stage, folder)
     elif before is None or before.written_by != written_by:
         raise FileError(folder, "was filled by others during the work: choose another folder")

@@ -4,12 +4,14 @@ The modules import heavy packages only inside functions, so that `dqslam --help`
 """
 
 import sys
+import warnings
 from collections.abc import Callable, Sequence
 from typing import Annotated, Any
 
 import typer
 
 from dqslam._files import FileErrors
+from dqslam._manifest import ChangedFileWarning
 from dqslam._version import version
 from dqslam.cli.ablation import ablation
 from dqslam.cli.convert import convert
@@ -80,6 +82,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Bad input gives one line on stderr, and a file of settings one line for each mistake. A mistake
     in dqslam itself keeps its traceback.
     """
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", ChangedFileWarning)
+        warnings.showwarning = _show_warning
+        return _run(arguments)
+
+
+def _run(arguments: Sequence[str] | None) -> int:
     try:
         code = app(arguments, prog_name="dqslam", standalone_mode=False) or 0
     except (KeyboardInterrupt, typer.Abort):
@@ -93,6 +102,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if code == _INTERRUPTED:
         _say("stopped")
     return int(code)
+
+
+def _show_warning(message: Warning | str, category: type[Warning], *_: Any) -> None:
+    """Show a warning as one line for the user, without the place in the source."""
+    _say(f"warning: {message}")
 
 
 def _say(message: str) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from dqslam._files import refuse_inputs
+from dqslam._files import FileError, refuse_inputs
 from dqslam._manifest import check_files
 from dqslam._outputs import belongs_to, output_set
 from dqslam.cli.found import read_with_truth
@@ -105,6 +105,8 @@ def plot(
         from dqslam.plot.overlay import check_video
 
         check_video(video)
+    if not directory.is_dir():
+        raise FileError(directory, "no such directory")
     output = Output(quiet=quiet, as_json=json)
     out = directory / "figures" if out is None else out
     inputs = (directory, groundtruth, objects, images, frame_times)

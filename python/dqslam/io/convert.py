@@ -85,6 +85,8 @@ def convert(
         Called with the share of a bag or a folder that has been read; not for other files.
     """
     source, out = Path(source), Path(out)
+    if out.exists() and source.exists() and out.samefile(source):
+        raise ValueError(f"{out}: the file would be written over itself")
     context = context or ConvertContext()
     for file in (out, _frames_file(out)):
         refuse_inputs(file, [source, *context.files])
