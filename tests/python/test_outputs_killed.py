@@ -79,7 +79,7 @@ _TOUCHES = ("open", "os.mkdir", "os.rename", "os.remove", "os.rmdir", "os.chmod"
 
 @pytest.fixture(autouse=True)
 def no_waiting_for_the_disk(monkeypatch):
-    """A killed process, unlike a machine without power, leaves to the system what it has written."""
+    """What a killed process has written is with the system, unlike after a loss of power."""
     monkeypatch.setattr(os, "fsync", lambda handle: None)
 
 

@@ -104,7 +104,7 @@ def _run(arguments: Sequence[str] | None) -> int:
     return int(code)
 
 
-def _show_warning(message: Warning | str, category: type[Warning], *_: Any) -> None:
+def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
     """Show a warning as one line for the user, without the place in the source."""
     _say(f"warning: {message}")
 

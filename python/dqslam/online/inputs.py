@@ -7,17 +7,37 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dqslam import _core
-from dqslam._checks import Bools, Floats, Ints, as_covariances, reject_rows
+from dqslam._checks import (
+    Bools,
+    Floats,
+    Ints,
+    as_covariances,
+    as_floats,
+    reject_large,
+    reject_rows,
+)
+from dqslam._limits import (
+    LARGEST_ANGLE_RAD,
+    LARGEST_COORDINATE_M,
+    LARGEST_ID,
+    LARGEST_PIXEL,
+    LARGEST_STEP_VARIANCE_M2,
+    LARGEST_STEP_VARIANCE_RAD2,
+    LARGEST_TIME_S,
+    SMALLEST_VARIANCE,
+)
 from dqslam.assumptions import BoxNoise
 from dqslam.online.integrated_odometry import identity_pose
 from dqslam.online.objects import Registry
 from dqslam.online.step import Motion, StepBoxes, StepMeasurements, StepPositions
-from dqslam.recording import as_poses, tangent_size
+from dqslam.recording import as_poses, pose_size, tangent_size
 
-Int32s = NDArray[np.int32]
+LARGEST_PATH_M = 0.5 * LARGEST_COORDINATE_M
+"""How far odometry may lead: an estimate that lies further out can still be saved and loaded."""
+_UNIT = 1e-6  # how far a quaternion's length may be from 1
 
 
 def path_begin(
@@ -37,11 +57,12 @@ def path_begin(
 
 def next_time(last: float | None, timestamp: float | None) -> float:
     """Return the time of a step [s] after the last, one second later by default."""
-    if timestamp is None:
-        return 0.0 if last is None else last + 1.0
-    time = float(timestamp)
+    after = 0.0 if last is None else last + 1.0
+    time = after if timestamp is None else float(timestamp)
     if not math.isfinite(time):
         raise ValueError(f"timestamp {time} is not finite")
+    if abs(time) > LARGEST_TIME_S:
+        raise ValueError(f"timestamp {time:g} is beyond {LARGEST_TIME_S:g} s")
     if last is not None and time <= last:
         word = "repeats the last one" if time == last else f"is before the last, {last!r}"
         raise ValueError(f"timestamp {time!r} {word}")
@@ -49,11 +70,16 @@ def next_time(last: float | None, timestamp: float | None) -> float:
 
 
 def motion_arrays(
-    odometry: Motion | None, begin: tuple[Floats, Floats] | None, covariance: Floats | None
+    odometry: Motion | None,
+    begin: tuple[Floats, Floats] | None,
+    covariance: Floats | None,
+    pose_model: _core.PoseModel,
+    last_poses: Floats,
 ) -> tuple[Floats, Floats]:
     """Return a motion and its covariance; of the first step, where it begins.
 
-    ``covariance`` is believed instead of the motion's own.
+    ``covariance`` is believed instead of the motion's own. From none of the last poses, (m, d), may
+    the motion lead further from the origin than files can tell.
     """
     if begin is not None:
         if odometry is not None:
@@ -63,8 +89,53 @@ def motion_arrays(
         raise ValueError(
             "no odometry leads here; across a gap, give a guess and a covariance as wide"
         )
-    believed = odometry.covariance if covariance is None else covariance
-    return np.asarray(odometry.relative, np.float64), np.asarray(believed, np.float64)
+    relative = _as_numbers("odometry", odometry.relative)
+    size, k = pose_size(pose_model), tangent_size(pose_model)
+    if relative.shape != (size,) or not np.isfinite(relative).all():
+        raise ValueError(f"odometry: expected {size} finite numbers")
+    if pose_model == _core.PoseModel.SE3 and abs(np.linalg.norm(relative[3:]) - 1.0) > _UNIT:
+        raise ValueError("odometry row 0: the quaternion is not unit")
+    if pose_model == _core.PoseModel.SE2 and abs(relative[2]) > LARGEST_ANGLE_RAD:
+        raise ValueError(f"odometry: turns by {relative[2]:g} rad, beyond {LARGEST_ANGLE_RAD:g}")
+    places = 2 if pose_model == _core.PoseModel.SE2 else 3
+    there = _core.compose(pose_model, last_poses, np.tile(relative, (len(last_poses), 1)))
+    reach = float(np.abs(there[:, :places]).max())
+    if not reach <= LARGEST_PATH_M:
+        raise ValueError(f"odometry: leads {reach:g} m from the origin, beyond {LARGEST_PATH_M:g}")
+    own = _as_covariance("odometry_covariance", odometry.covariance, k, places)
+    return relative, own if covariance is None else covariance
+
+
+def _as_numbers(name: str, values: ArrayLike) -> Floats:
+    """Return a float array; complex numbers are refused, and not cut."""
+    array = np.asarray(values)
+    if array.dtype.kind == "c":
+        raise ValueError(f"{name} row 0: complex, not real")
+    return array.astype(np.float64, copy=False)
+
+
+def _as_covariance(name: str, values: ArrayLike, size: int, places: int) -> Floats:
+    """Return the covariance (size, size) of a motion as the core wants it; first of its places."""
+    array = _as_numbers(name, values)
+    if array.shape != (size, size) or not np.isfinite(array).all():
+        raise ValueError(f"{name}: expected shape ({size}, {size}), finite")
+    variance = np.diagonal(array)
+    off = np.abs(array - array.T).max()
+    if variance.min() <= 0.0 or off > 1e-9 * np.abs(array).max():
+        raise ValueError(f"{name}: not symmetric positive definite")
+    for part, largest, unit in (
+        (variance[:places], LARGEST_STEP_VARIANCE_M2, "m^2"),
+        (variance[places:], LARGEST_STEP_VARIANCE_RAD2, "rad^2"),
+    ):
+        if not SMALLEST_VARIANCE <= part.min() <= part.max() <= largest:
+            limits = f"{SMALLEST_VARIANCE:g} and {largest:g} {unit}"
+            raise ValueError(f"{name}: variances not between {limits}: {part.tolist()}")
+    scale = 1.0 / np.sqrt(variance)
+    try:
+        np.linalg.cholesky(scale[:, None] * array * scale)
+    except np.linalg.LinAlgError:
+        raise ValueError(f"{name}: not symmetric positive definite") from None
+    return array
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,31 +158,61 @@ _NO_BOXES = CheckedBoxes(
 )
 
 
-def check_boxes(boxes: StepBoxes | None) -> CheckedBoxes:
-    """Return the boxes as arrays; ValueError names what does not fit. The core checks numbers."""
+def check_boxes(boxes: StepBoxes | None, camera: _core.Camera) -> CheckedBoxes:
+    """Return the boxes as arrays; ValueError names what does not fit, and its row."""
     if boxes is None:
         return _NO_BOXES
-    box = np.asarray(boxes.box, dtype=np.float64)
+    box = _as_numbers("boxes", boxes.box)
     if box.size == 0:
         return _NO_BOXES
     count = len(box)
     if box.shape != (count, 4):
         raise ValueError(f"boxes: expected shape (n, 4), got {box.shape}")
-    if not np.isfinite(box).all():
-        reject_rows("boxes", ~np.isfinite(box), "NaN or infinite", box)
+    _check_numbers(box, camera)
     object_id = np.asarray(boxes.object_id)
     if object_id.shape != (count,) or object_id.dtype.kind not in "iu":
         raise ValueError(f"object_id: expected {count} whole numbers")
-    if min(object_id.tolist()) < -1:  # a list of a few is faster than an array
-        reject_rows("object_id", object_id < -1, "not an object id", object_id)
+    ids = object_id.tolist()  # a list of a few is faster than an array
+    if min(ids) < -1 or max(ids) > LARGEST_ID:
+        wrong = np.array([not -1 <= one <= LARGEST_ID for one in ids])
+        reject_rows("object_id", wrong, "not an object id", object_id)
     names = boxes.class_name or ("object",) * count
     if len(names) != count:
         raise ValueError(f"class_name: expected {count} names, got {len(names)}")
+    for row, name in enumerate(names):
+        if not isinstance(name, str):
+            raise ValueError(f"class_name row {row}: {name!r} is not a text")
     given = np.zeros((count, 4)) if boxes.truncated is None else boxes.truncated
-    truncated = np.asarray(given, dtype=np.bool_)
+    truncated = np.asarray(given)
     if truncated.shape != (count, 4):
         raise ValueError(f"truncated: expected shape ({count}, 4), got {truncated.shape}")
-    return CheckedBoxes(box, object_id.astype(np.int64), names, truncated)
+    if truncated.dtype != np.bool_:
+        reject_rows("truncated", ~np.isin(truncated, [0, 1]), "not true or false", truncated)
+    return CheckedBoxes(box, object_id.astype(np.int64), names, truncated.astype(np.bool_))
+
+
+def _check_numbers(box: Floats, camera: _core.Camera) -> None:
+    """Raise a ValueError unless boxes (n, 4) are boxes in the image."""
+    corners = box.T
+    with np.errstate(invalid="ignore"):
+        is_good = (
+            (np.abs(box).max() <= LARGEST_PIXEL)
+            and (corners[:2] < corners[2:]).all()
+            and (camera.has_distortion or _meets_image(corners, camera).all())
+        )
+    if is_good:
+        return
+    reject_rows("boxes", ~np.isfinite(box), "NaN or infinite", box)
+    reject_rows("boxes", np.abs(box) > LARGEST_PIXEL, f"beyond {LARGEST_PIXEL:g} px", box)
+    reject_rows("boxes", box[:, :2] >= box[:, 2:], "inverted or empty box", box)
+    reject_rows("boxes", ~_meets_image(corners, camera), "outside the image", box)
+
+
+def _meets_image(corners: Floats, camera: _core.Camera) -> Bools:
+    """Whether boxes, given by their columns (4, n), are in the image at least in part, (n,)."""
+    left, top, right, bottom = corners
+    last_u, last_v = camera.width - 0.5, camera.height - 0.5
+    return np.asarray((right > -0.5) & (bottom > -0.5) & (left < last_u) & (top < last_v))
 
 
 def box_noise_rows(noise: BoxNoise, box: Floats) -> Floats:
@@ -139,15 +240,20 @@ def measurement_tables(
 
 
 def _measurement_table(given: StepMeasurements, registry: Registry) -> _core.MeasurementTable:
-    ids = np.asarray(given.object_id).tolist()
+    ids = np.asarray(given.object_id).reshape(-1).tolist()
     unknown = [one for one in ids if one not in registry.row_of]
     if unknown:
         raise ValueError(f"{given.kind}s: object {unknown[0]} is not in the map yet")
-    count = len(ids)
+    count, name = len(ids), f"{given.kind}s"
+    value = as_floats(f"{name}.value", given.value, [None, None])
+    if len(value) != count:
+        raise ValueError(f"{name}.value: expected {count} rows, got {len(value)}")
+    reject_large(f"{name}.value", value, LARGEST_COORDINATE_M, "")
+    covariance = as_covariances(f"{name}.covariance", given.covariance, count, value.shape[1])
     return _core.MeasurementTable(
         kind=given.kind,
         pose=np.zeros(count, dtype=np.int32),
         object=np.array([registry.row_of[one] for one in ids], dtype=np.int32),
-        value=np.asarray(given.value, dtype=np.float64),
-        covariance=np.asarray(given.covariance, dtype=np.float64).reshape(count, -1),
+        value=value,
+        covariance=covariance.reshape(count, -1),
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -19,7 +20,8 @@ from dqslam.io.camera import read_camera
 from dqslam.io.files import FileError, read_text
 from dqslam.io.results.boxes import BoxTable, read_boxes
 from dqslam.io.results.covariances import read_covariances
-from dqslam.io.trajectory import read_trajectory
+from dqslam.io.results.save import NO_POSES
+from dqslam.io.trajectory import Trajectory, read_trajectory
 
 RESULT_FILES = (
     "trajectory.txt",
@@ -137,6 +139,14 @@ def load_results(directory: str | Path) -> Results:
     >>> results.poses.shape, results.objects.centers.shape
     ((253, 7), (10, 3))
     """
+    found = load_map_results(directory)
+    if not len(found.timestamps):
+        raise FileError(found.directory / "trajectory.txt", "holds no pose: it is a map alone")
+    return found
+
+
+def load_map_results(directory: str | Path) -> Results:
+    """Read a directory of results as ``load_results`` does, or that of a session without steps."""
     directory = Path(directory)
     for _ in range(_MOST_READINGS):
         folder = standing(directory)
@@ -156,8 +166,8 @@ def load_results(directory: str | Path) -> Results:
 
 
 def _read_results(directory: Path) -> Results:
-    times, poses = read_trajectory(directory / "trajectory.txt")
-    odometry_times, odometry = read_trajectory(directory / "odometry.txt")
+    times, poses = _read_path(directory / "trajectory.txt")
+    odometry_times, odometry = _read_path(directory / "odometry.txt")
     if not np.array_equal(times, odometry_times):
         message = f"its times are not those of {directory / 'trajectory.txt'}"
         raise FileError(directory / "odometry.txt", message)
@@ -176,6 +186,14 @@ def _read_results(directory: Path) -> Results:
         boxes=read_boxes(boxes, times) if boxes.exists() else None,
         report=_read_json(report) if report.exists() else {},
     )
+
+
+def _read_path(path: Path) -> Trajectory:
+    """Read a path; that of a session without steps is a comment that says so."""
+    with contextlib.suppress(OSError, UnicodeDecodeError):
+        if path.read_text(encoding="utf-8") == NO_POSES:
+            return Trajectory(np.zeros(0), np.zeros((0, 7)))
+    return read_trajectory(path)
 
 
 def _read_json(path: Path) -> dict[str, Any]:

@@ -11,11 +11,14 @@ from dqslam import _core
 from dqslam._checks import Bools, Floats, require
 from dqslam._outputs import output_set
 from dqslam.estimate import Estimate
-from dqslam.io.files import write_json
+from dqslam.io.files import write_json, write_text
 from dqslam.io.results.boxes import write_boxes
 from dqslam.io.results.covariances import write_covariances
 from dqslam.io.trajectory import write_trajectory
 from dqslam.recording import Detections
+
+NO_POSES = "# no poses\n"
+"""The content of ``trajectory.txt`` and ``odometry.txt`` of an estimate without poses."""
 
 
 class Covariances(Protocol):
@@ -92,7 +95,10 @@ def write_estimate(
     paths = {"trajectory.txt": estimate.poses, "odometry.txt": estimate.initial_poses}
     for name, poses in paths.items():
         cameras = _core.world_from_camera(estimate.pose_model, estimate.camera, poses)
-        write_trajectory(directory / name, estimate.timestamps, cameras)
+        if len(poses):
+            write_trajectory(directory / name, estimate.timestamps, cameras)
+        else:
+            write_text(directory / name, NO_POSES)
     write_json(directory / "camera.json", _camera(estimate.camera))
     objects = [_object(estimate, row, marginals) for row in range(len(estimate.object_ids))]
     dropped = [{"id": number, "reason": reason} for number, reason in estimate.dropped.items()]
