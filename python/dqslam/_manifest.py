@@ -192,9 +192,9 @@ def check_files(folder: Path, names: Iterable[str]) -> None:
     A file that somebody has changed, added or taken away is a ChangedFileWarning. For errors, see
     ``complete_manifest``.
     """
-    manifest = complete_manifest(folder)
-    if manifest is None:
-        return
+    names, manifest = tuple(names), complete_manifest(folder)
+    if manifest is None or manifest.files.keys().isdisjoint(names):
+        return  # it is of files that were added to a folder without one
     for name in names:
         path, hashes = folder / name, manifest.files.get(name)
         if hashes is None and path.exists():

@@ -299,6 +299,15 @@ def test_what_differs_from_the_manifest_is_told(tmp_path):
     ]
 
 
+def test_a_manifest_of_added_files_says_nothing_of_others(tmp_path):
+    (tmp_path / "a").write_text("abc")
+    with added_files(tmp_path, ["e"], "dqslam evaluate") as folder:
+        (folder / "e").write_text("new")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_files(tmp_path, ["a", "b"])
+
+
 def test_an_interrupted_exchange_is_an_error(tmp_path):
     write_manifest(tmp_path, Manifest("dqslam run", {"a": (ABC, "0")}, complete=False))
     with pytest.raises(FileError, match="the writing of its files was interrupted"):

@@ -3,6 +3,7 @@
 The modules import heavy packages only inside functions, so that `dqslam --help` is fast.
 """
 
+import os
 import sys
 import warnings
 from collections.abc import Callable, Sequence
@@ -12,6 +13,7 @@ import typer
 
 from dqslam._files import FileErrors
 from dqslam._manifest import ChangedFileWarning
+from dqslam._repr import printable
 from dqslam._version import version
 from dqslam.cli.ablation import ablation
 from dqslam.cli.convert import convert
@@ -40,6 +42,7 @@ EXIT_CODES = {
     2: "bad input: options, files, or a problem that they do not determine",
     3: "done, and `inspect --strict` has found a likely mistake",
     130: "stopped by Ctrl-C",
+    141: "stopped, because the reader of its output has gone",
 }
 
 app = typer.Typer(
@@ -72,6 +75,7 @@ for _panel, _commands in COMMANDS.items():
 
 _INTERRUPTED = 130
 _BAD_INPUT = 2
+_READER_GONE = 141  # as of a program that SIGPIPE ends
 # UsageError, the base of BadParameter, has no public name in typer.
 _UsageError: Any = typer.BadParameter.__mro__[1]
 
@@ -91,6 +95,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _run(arguments: Sequence[str] | None) -> int:
     try:
         code = app(arguments, prog_name="dqslam", standalone_mode=False) or 0
+        sys.stdout.flush()  # here, where an error can be caught
+    except (BrokenPipeError, SystemExit):  # click's way to say the same
+        _forget_output()
+        code = _READER_GONE
     except (KeyboardInterrupt, typer.Abort):
         code = _INTERRUPTED
     except (_UsageError, ValueError, OSError, RuntimeError) as error:
@@ -104,10 +112,17 @@ def _run(arguments: Sequence[str] | None) -> int:
     return int(code)
 
 
+def _forget_output() -> None:
+    """Let the rest of the output go nowhere, so that the interpreter's last flush is quiet."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, sys.stdout.fileno())
+    os.close(nowhere)
+
+
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
     """Show a warning as one line for the user, without the place in the source."""
     _say(f"warning: {message}")
 
 
 def _say(message: str) -> None:
-    print("dqslam:", " ".join(message.split()), file=sys.stderr)  # noqa: T201
+    print("dqslam:", printable(" ".join(message.split())), file=sys.stderr)  # noqa: T201

@@ -33,7 +33,7 @@ from dqslam.assumptions import BoxNoise
 from dqslam.online.integrated_odometry import identity_pose
 from dqslam.online.objects import Registry
 from dqslam.online.step import Motion, StepBoxes, StepMeasurements, StepPositions
-from dqslam.recording import as_poses, pose_size, tangent_size
+from dqslam.recording import as_poses, tangent_size
 
 LARGEST_PATH_M = 0.5 * LARGEST_COORDINATE_M
 """How far odometry may lead: an estimate that lies further out can still be saved and loaded."""
@@ -90,20 +90,24 @@ def motion_arrays(
             "no odometry leads here; across a gap, give a guess and a covariance as wide"
         )
     relative = _as_numbers("odometry", odometry.relative)
-    size, k = pose_size(pose_model), tangent_size(pose_model)
-    if relative.shape != (size,) or not np.isfinite(relative).all():
+    is_flat = pose_model == _core.PoseModel.SE2
+    size, k, places = (3, 3, 2) if is_flat else (7, 6, 3)
+    numbers = relative.tolist()
+    if relative.shape != (size,) or not all(map(math.isfinite, numbers)):
         raise ValueError(f"odometry: expected {size} finite numbers")
-    if pose_model == _core.PoseModel.SE3 and abs(np.linalg.norm(relative[3:]) - 1.0) > _UNIT:
+    if not is_flat and abs(math.hypot(*numbers[3:]) - 1.0) > _UNIT:
         raise ValueError("odometry row 0: the quaternion is not unit")
-    if pose_model == _core.PoseModel.SE2 and abs(relative[2]) > LARGEST_ANGLE_RAD:
-        raise ValueError(f"odometry: turns by {relative[2]:g} rad, beyond {LARGEST_ANGLE_RAD:g}")
-    places = 2 if pose_model == _core.PoseModel.SE2 else 3
-    there = _core.compose(pose_model, last_poses, np.tile(relative, (len(last_poses), 1)))
-    reach = float(np.abs(there[:, :places]).max())
+    if is_flat and abs(numbers[2]) > LARGEST_ANGLE_RAD:
+        raise ValueError(f"odometry: turns by {numbers[2]:g} rad, beyond {LARGEST_ANGLE_RAD:g}")
+    there = _core.compose(pose_model, last_poses, relative[None].repeat(len(last_poses), axis=0))
+    reach = max(max(map(abs, one[:places])) for one in there.tolist())
     if not reach <= LARGEST_PATH_M:
         raise ValueError(f"odometry: leads {reach:g} m from the origin, beyond {LARGEST_PATH_M:g}")
     own = _as_covariance("odometry_covariance", odometry.covariance, k, places)
-    return relative, own if covariance is None else covariance
+    if covariance is None:
+        return relative, own  # whether it is symmetric positive definite, the core says
+    as_covariances("odometry_covariance", own[None], 1, k)
+    return relative, covariance
 
 
 def _as_numbers(name: str, values: ArrayLike) -> Floats:
@@ -115,26 +119,20 @@ def _as_numbers(name: str, values: ArrayLike) -> Floats:
 
 
 def _as_covariance(name: str, values: ArrayLike, size: int, places: int) -> Floats:
-    """Return the covariance (size, size) of a motion as the core wants it; first of its places."""
+    """Return the covariance (size, size) of a motion, its variances checked; first of places."""
     array = _as_numbers(name, values)
     if array.shape != (size, size) or not np.isfinite(array).all():
         raise ValueError(f"{name}: expected shape ({size}, {size}), finite")
-    variance = np.diagonal(array)
-    off = np.abs(array - array.T).max()
-    if variance.min() <= 0.0 or off > 1e-9 * np.abs(array).max():
-        raise ValueError(f"{name}: not symmetric positive definite")
+    variance = array.diagonal().tolist()
     for part, largest, unit in (
         (variance[:places], LARGEST_STEP_VARIANCE_M2, "m^2"),
         (variance[places:], LARGEST_STEP_VARIANCE_RAD2, "rad^2"),
     ):
-        if not SMALLEST_VARIANCE <= part.min() <= part.max() <= largest:
+        if min(part) <= 0.0:
+            raise ValueError(f"{name}: not symmetric positive definite")
+        if not SMALLEST_VARIANCE <= min(part) <= max(part) <= largest:
             limits = f"{SMALLEST_VARIANCE:g} and {largest:g} {unit}"
-            raise ValueError(f"{name}: variances not between {limits}: {part.tolist()}")
-    scale = 1.0 / np.sqrt(variance)
-    try:
-        np.linalg.cholesky(scale[:, None] * array * scale)
-    except np.linalg.LinAlgError:
-        raise ValueError(f"{name}: not symmetric positive definite") from None
+            raise ValueError(f"{name}: variances not between {limits}: {part}")
     return array
 
 
@@ -192,27 +190,28 @@ def check_boxes(boxes: StepBoxes | None, camera: _core.Camera) -> CheckedBoxes:
 
 
 def _check_numbers(box: Floats, camera: _core.Camera) -> None:
-    """Raise a ValueError unless boxes (n, 4) are boxes in the image."""
-    corners = box.T
-    with np.errstate(invalid="ignore"):
-        is_good = (
-            (np.abs(box).max() <= LARGEST_PIXEL)
-            and (corners[:2] < corners[2:]).all()
-            and (camera.has_distortion or _meets_image(corners, camera).all())
-        )
-    if is_good:
+    """Raise a ValueError unless boxes (n, 4) are boxes in the image, at least in part."""
+    last_u, last_v = camera.width - 0.5, camera.height - 0.5
+    if camera.has_distortion:  # the image is no rectangle in undistorted pixels
+        last_u, last_v, first = LARGEST_PIXEL, LARGEST_PIXEL, -LARGEST_PIXEL
+    else:
+        first = -0.5
+    # Numbers of a few boxes are compared faster one by one than as arrays; so is NaN, with false.
+    if all(
+        -LARGEST_PIXEL <= left < right <= LARGEST_PIXEL
+        and -LARGEST_PIXEL <= top < bottom <= LARGEST_PIXEL
+        and left < last_u
+        and top < last_v
+        and right > first
+        and bottom > first
+        for left, top, right, bottom in box.tolist()
+    ):
         return
     reject_rows("boxes", ~np.isfinite(box), "NaN or infinite", box)
     reject_rows("boxes", np.abs(box) > LARGEST_PIXEL, f"beyond {LARGEST_PIXEL:g} px", box)
     reject_rows("boxes", box[:, :2] >= box[:, 2:], "inverted or empty box", box)
-    reject_rows("boxes", ~_meets_image(corners, camera), "outside the image", box)
-
-
-def _meets_image(corners: Floats, camera: _core.Camera) -> Bools:
-    """Whether boxes, given by their columns (4, n), are in the image at least in part, (n,)."""
-    left, top, right, bottom = corners
-    last_u, last_v = camera.width - 0.5, camera.height - 0.5
-    return np.asarray((right > -0.5) & (bottom > -0.5) & (left < last_u) & (top < last_v))
+    outside = (box[:, 2:] <= first) | (box[:, :2] >= [last_u, last_v])
+    reject_rows("boxes", outside, "outside the image", box)
 
 
 def box_noise_rows(noise: BoxNoise, box: Floats) -> Floats:

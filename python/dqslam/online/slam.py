@@ -183,14 +183,14 @@ class OnlineSlam(SessionReader):
         if is_unsettled and odometry is not None and np.shape(odometry.relative) == _IN_SPACE:
             return self._begin_in_space(step)
         is_done = self._polisher.is_done
-        checked = check_step(self._state, *step, dry_run=is_done)
+        checked, prepared = check_step(self._state, *step, dry_run=is_done)
         if not len(self):  # copied, because the caller may write the next image into its arrays
             self._first_step = copy.deepcopy(step)
         elif odometry is not None:
             self._may_leave_plane = False
         if is_done:
             self._polisher.take()
-        return take_step(self._state, self._identifier, checked)
+        return take_step(self._state, self._identifier, checked, prepared)
 
     def _begin_in_space(self, step: tuple[Any, ...]) -> _core.StepReport:
         """Begin again in SE(3), because the first motion is; nothing changes if it is refused."""

@@ -40,7 +40,7 @@ class CheckedStep:
 
 
 @dataclass(frozen=True, eq=False)
-class _Prepared:
+class Prepared:
     """What the core is given, and the ids that it does not know."""
 
     observations: _core.StepObservations
@@ -65,8 +65,10 @@ def check_step(
     measurements: Sequence[StepMeasurements],
     *,
     dry_run: bool,
-) -> CheckedStep:
+) -> tuple[CheckedStep, Prepared | None]:
     """Check a step against a session, which does not change.
+
+    Returns the step and, unless something else changes before it is taken, what the core is given.
 
     Parameters
     ----------
@@ -102,19 +104,23 @@ def check_step(
             state.core.clone().add(relative, covariance, prepared.observations)
     except (ValueError, TypeError, AttributeError, OverflowError) as error:
         raise StepError(f"step {count}: {error}") from None
-    return step
+    return step, None if dry_run else prepared
 
 
-def take_step(state: State, identifier: Identifier, step: CheckedStep) -> _core.StepReport:
+def take_step(
+    state: State, identifier: Identifier, step: CheckedStep, prepared: Prepared | None
+) -> _core.StepReport:
     """Add a step to a session, as a whole: Ctrl-C waits. See ``OnlineSlam.add``."""
     with uninterrupted():
-        return _take_step(state, identifier, step)
+        return _take_step(state, identifier, step, prepared)
 
 
-def _take_step(state: State, identifier: Identifier, step: CheckedStep) -> _core.StepReport:
+def _take_step(
+    state: State, identifier: Identifier, step: CheckedStep, prepared: Prepared | None
+) -> _core.StepReport:
     registry, count = state.registry, len(state.timestamps)
     try:
-        prepared = _prepare(state, step)
+        prepared = prepared or _prepare(state, step)
         report = state.core.add(step.relative, step.covariance, prepared.observations)
     except (ValueError, TypeError) as error:
         raise StepError(f"step {count}: {error}") from None
@@ -137,7 +143,7 @@ def _take_step(state: State, identifier: Identifier, step: CheckedStep) -> _core
     return report
 
 
-def _prepare(state: State, step: CheckedStep) -> _Prepared:
+def _prepare(state: State, step: CheckedStep) -> Prepared:
     settings, registry, boxes = state.settings, state.registry, step.boxes
     believed = boxes.object_id.tolist() if settings.believes_ids else []
     known = [place for place, one in enumerate(believed) if one >= 0]
@@ -156,7 +162,7 @@ def _prepare(state: State, step: CheckedStep) -> _Prepared:
         log_size_mean=np.array([prior.log_mean for prior in priors]),
         log_size_sigma=np.array([prior.log_sigma for prior in priors]),
     )
-    return _Prepared(observations, ids, names, [ids[place] for place in new], rows, object_rows)
+    return Prepared(observations, ids, names, [ids[place] for place in new], rows, object_rows)
 
 
 def _step_covariance(state: State) -> Floats | None:
