@@ -52,12 +52,13 @@ class Harness:
     seed
         The same seed gives the same cases.
     memory_gb
-        A case that needs more fails; 0 for no limit, which AddressSanitizer needs.
+        A case that needs more fails; 0 for no limit, as under a sanitizer.
     """
 
     def __init__(self, found: Targets, seed: str, *, memory_gb: float) -> None:
         self._targets = list(found.items())
-        self._seed, self._memory = seed, int(memory_gb * 2**30)
+        is_sanitized = "san.so" in os.environ.get("LD_PRELOAD", "")  # which maps terabytes
+        self._seed, self._memory = seed, 0 if is_sanitized else int(memory_gb * 2**30)
         self._current = mmap.mmap(-1, 8)
         self._kinds: set[str] = set()
         self.done = 0
@@ -79,10 +80,14 @@ class Harness:
         reading, writing = os.pipe()
         child = os.fork()
         if child == 0:
-            os.close(reading)
-            with os.fdopen(writing, "w") as told:
-                self._work(end, cases, lambda text: print(text, file=told, flush=True))
-            os._exit(0)
+            code = 1
+            try:
+                os.close(reading)
+                with os.fdopen(writing, "w") as told:
+                    self._work(end, cases, lambda text: print(text, file=told, flush=True))
+                code = 0
+            finally:
+                os._exit(code)
         os.close(writing)
         with os.fdopen(reading) as told:
             hangs = self._watch(child, told.fileno(), say)

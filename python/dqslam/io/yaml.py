@@ -22,7 +22,7 @@ def parse_yaml(path: str | Path, text: str) -> dict[str, Any]:
         line = None if error.problem_mark is None else error.problem_mark.line + 1
         raise FileError(path, f"not YAML: {error.problem}", line) from None
     except yaml.YAMLError as error:
-        raise FileError(path, f"not YAML: {error}") from None
+        raise FileError(path, f"not YAML: {' '.join(str(error).split())}") from None
     except RecursionError:
         raise FileError(path, "nested too deeply") from None
     if not isinstance(table, dict):
