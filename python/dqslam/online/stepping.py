@@ -138,7 +138,10 @@ def _take_step(
     waiting = np.flatnonzero(object_rows < 0)
     if waiting.size:
         observation_rows = report.first_observation + waiting
-        object_rows[waiting] = identifier.identify(step.boxes, waiting, observation_rows)
+        # What overflows after a jump over the globe is not determined, and compares as false.
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            found = identifier.identify(step.boxes, waiting, observation_rows)
+        object_rows[waiting] = found
         state.shown = np.array([*registry.ids, -1], dtype=np.int64)[object_rows]
     return report
 
