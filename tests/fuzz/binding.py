@@ -12,7 +12,8 @@ from dqslam import _core
 
 ODD = (0.0, -0.0, 1.0, -1.0, np.nan, np.inf, -np.inf, 1e308, 1e-308, 1e100, 1e6, 0.5, 640.0)
 SIZES = (0, 1, 2, 3, 4, 6, 7, 9, 16, 36, 81)
-ERRORS = (ValueError, TypeError, RuntimeError, IndexError)
+# Who asks for two billion points of an outline is told that there is no room for them.
+ERRORS = (ValueError, TypeError, RuntimeError, IndexError, MemoryError)
 ARGUMENT = re.compile(r"(\w+): ([^,()]+(?:\[[^\]]*\])?)")
 
 
