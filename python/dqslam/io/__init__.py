@@ -1,5 +1,6 @@
 """Files in and out: each format has a module, which states its conventions and errors."""
 
+from dqslam._manifest import ChangedFileWarning as ChangedFileWarning
 from dqslam.io.camera import CAMERA_FORMATS as CAMERA_FORMATS
 from dqslam.io.camera import read_camera as read_camera
 from dqslam.io.convert import ConvertContext as ConvertContext

@@ -171,8 +171,9 @@ class OnlineSlam(SessionReader):
         Raises
         ------
         StepError
-            If the time does not increase, if odometry is missing, if numbers are not finite, or if
-            a box is invalid. The session is then unchanged.
+            If the time does not increase, if odometry is missing, if numbers are not finite or
+            beyond their limits (docs/reliability.md), or if a box is invalid or outside the image.
+            The session is then unchanged, to the bit.
         """
         for given, kind in ((odometry, Motion), (boxes, StepBoxes), (positions, StepPositions)):
             if given is not None:
