@@ -16,6 +16,8 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import BinaryIO
 
+from dqslam._exchange import is_stage
+
 
 class FileError(ValueError):
     """A mistake in a file, as ``path:line: message`` or ``path: message``."""
@@ -70,21 +72,24 @@ def whole_file(path: str | Path) -> Iterator[Path]:
         target = given if special else Path(os.path.realpath(given))
         folder = Path(tempfile.gettempdir()) if special else target.parent
         folder.mkdir(parents=True, exist_ok=True)
+        if target.exists() and not os.access(target, os.W_OK):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
         temporary = _new_file(folder, target)
     except OSError as error:
-        raise FileError(given, f"cannot be written: {error.strerror}") from None
+        raise FileError(given, f"cannot be written: {error.strerror or error}") from None
     try:
         yield temporary
         if special:
             with temporary.open("rb") as content, special() as stream:
                 shutil.copyfileobj(content, stream)
         else:
-            sync(temporary)
+            if not is_stage(target.parent.name):  # whose files go to the disk together
+                sync(temporary)
             if target.exists():
                 shutil.copymode(target, temporary)
             temporary.replace(target)
     except OSError as error:
-        raise FileError(given, f"cannot be written: {error.strerror}") from None
+        raise FileError(given, f"cannot be written: {error.strerror or error}") from None
     finally:
         with contextlib.suppress(OSError):
             temporary.unlink(missing_ok=True)
