@@ -53,6 +53,8 @@ def read_toml(path: str | Path) -> TomlFile:
     text = read_text(path).replace("\r\n", "\n")
     try:
         return TomlFile(path, text, tomllib.loads(text))
+    except RecursionError:
+        raise FileError(path, "nested too deeply") from None
     except tomllib.TOMLDecodeError as error:
         at = re.fullmatch(r"(.*) \(at (?:line (\d+), column \d+|end of document)\)", str(error))
         line = None if at is None else int(at[2] or text.rstrip().count("\n") + 1)
