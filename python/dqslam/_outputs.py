@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import shutil
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
@@ -70,29 +71,25 @@ def output_set(
         it, if the files cannot be written.
     """
     folder = Path(os.path.realpath(path))
-    made: list[Path] = []
-    try:
-        recover(folder)
-        others = _check(folder, path, written_by, inputs, beside_others)
-        made = _make(folder)
-        remove_stale_stages(folder)
-        in_place = bool(others) or cannot_be_renamed(folder)
-        stage, lock = new_stage(folder, inside=in_place)
-    except OSError as error:
-        _remove_empty(made)
-        raise FileError(path, f"cannot be written: {error.strerror}") from None
-    try:
-        yield stage
-        with uninterrupted():
-            _commit(stage, folder, written_by, in_place=in_place)
-    except FileError as error:
-        raise _renamed(error, stage, path) from None
-    except OSError as error:
-        raise FileError(path, f"cannot be written: {error.strerror}") from None
-    finally:
-        shutil.rmtree(stage, ignore_errors=True)
-        release(lock)
-        _remove_empty(made)
+    with contextlib.ExitStack() as undo:  # Ctrl-C, too, leaves nothing, whenever it comes
+        try:
+            recover(folder)
+            others = _check(folder, path, written_by, inputs, beside_others)
+            undo.callback(_remove_empty, _missing(folder))
+            # Made before the work, which would be in vain if it could not be made.
+            folder.mkdir(parents=True, exist_ok=True)
+            remove_stale_stages(folder)
+            in_place = bool(others) or cannot_be_renamed(folder)
+            stage, lock = new_stage(folder, inside=in_place)
+            undo.callback(release, lock)
+            undo.callback(shutil.rmtree, stage, ignore_errors=True)
+            yield stage
+            with uninterrupted():
+                _commit(stage, folder, written_by, in_place=in_place)
+        except FileError as error:
+            raise _renamed(error, folder, path) from None
+        except OSError as error:
+            raise FileError(path, f"cannot be written: {error.strerror or error}") from None
 
 
 def check_output_set(
@@ -155,11 +152,9 @@ def _listed(names: list[str]) -> str:
     return ", ".join(names[:_MOST_NAMED]) + more
 
 
-def _make(folder: Path) -> list[Path]:
-    """Make a folder, so that it is seen before the work that it can be made; return what is new."""
-    missing = [one for one in (folder, *folder.parents) if not one.exists()]
-    folder.mkdir(parents=True, exist_ok=True)
-    return missing
+def _missing(folder: Path) -> list[Path]:
+    """Return the folders that have to be made for a folder, itself first."""
+    return [one for one in (folder, *folder.parents) if not one.exists()]
 
 
 def _remove_empty(folders: list[Path]) -> None:
@@ -168,9 +163,12 @@ def _remove_empty(folders: list[Path]) -> None:
             one.rmdir()
 
 
-def _renamed(error: FileError, stage: Path, path: str | Path) -> FileError:
-    """Let an error of a file in the temporary folder name the place where it was to be."""
-    error.args = (str(error).replace(str(stage), str(path)),)
+def _renamed(error: FileError, folder: Path, path: str | Path) -> FileError:
+    """Let an error of a file in a temporary folder name the place where it was to be."""
+    for place in (folder.parent, folder):
+        for part in re.findall(re.escape(str(place)) + r"/(\.[^/]*)", str(error)):
+            if is_stage(part):
+                error.args = (str(error).replace(str(place / part), str(path)),)
     return error
 
 
@@ -300,7 +298,7 @@ def added_files(
             check_added(folder, names, written_by, inputs=inputs)
             _add(stage, folder, written_by)
     except FileError as error:
-        raise _renamed(error, stage, folder) from None
+        raise _renamed(error, folder, folder) from None
     except OSError as error:
         raise FileError(folder, f"cannot be written: {error.strerror}") from None
     finally:

@@ -106,7 +106,10 @@ def motion_arrays(
     own = _as_covariance("odometry_covariance", odometry.covariance, k, places)
     if covariance is None:
         return relative, own  # whether it is symmetric positive definite, the core says
-    as_covariances("odometry_covariance", own[None], 1, k)
+    try:
+        as_covariances("odometry_covariance", own[None], 1, k)
+    except ValueError:
+        raise ValueError("odometry_covariance: not symmetric positive definite") from None
     return relative, covariance
 
 
