@@ -1,9 +1,12 @@
 """Checks of arguments and of the rows of arrays, with errors that name what is wrong."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from dqslam._limits import LARGEST_VARIANCE, SMALLEST_VARIANCE
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -54,16 +57,41 @@ def _check_shape(name: str, array: NDArray[np.generic], shape: Sequence[int | No
 
 def as_floats(name: str, values: ArrayLike, shape: Sequence[int | None]) -> Floats:
     """Return a read-only float copy of the given shape (None: any size), all entries finite."""
-    try:
-        array = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"{name}: not an array of numbers ({error})") from None
+    array = _as_numbers(name, values)
     if array.size == 0 and None in shape:
         array = array.reshape([0 if size is None else size for size in shape])
     _check_shape(name, array, shape)
     reject_rows(name, ~np.isfinite(array), "not finite", array)
     array.setflags(write=False)
     return array
+
+
+def _as_numbers(name: str, values: ArrayLike) -> Floats:
+    """Return a float copy; complex numbers have no order and are refused."""
+    try:
+        given = np.asarray(values)
+        numbers = None if given.dtype.kind == "c" else np.array(given, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{name}: not an array of numbers ({error})") from None
+    if numbers is None:
+        rows = np.atleast_1d(given)
+        reject_rows(name, np.full(rows.shape, True), "complex, not real", rows)
+        raise ValueError(f"{name}: complex, not real")  # it has no row
+    return numbers
+
+
+def _beyond_int64(given: NDArray[Any]) -> Bools:
+    """Whether numbers would wrap, or are floats so large that neighbors are the same."""
+    if given.dtype.kind == "f":
+        return np.asarray(np.abs(given) >= 2.0**53)
+    if given.dtype.kind == "u":
+        return np.asarray(given > np.iinfo(np.int64).max)
+    return np.zeros(given.shape, dtype=np.bool_)
+
+
+def reject_large(name: str, values: Floats, largest: float, unit: str) -> None:
+    """Raise a ValueError that names the first row with a number beyond a limit."""
+    reject_rows(name, np.abs(values) > largest, f"beyond {largest:g} {unit}", values)
 
 
 def as_ints(name: str, values: ArrayLike, size: int | None = None) -> Ints:
@@ -73,6 +101,7 @@ def as_ints(name: str, values: ArrayLike, size: int | None = None) -> Ints:
         if given.dtype.kind != "f":
             raise ValueError(f"{name}: not an array of whole numbers")
         reject_rows(name, ~(given == np.round(given)), "not a whole number", given)
+    reject_rows(name, _beyond_int64(given), "too large for 64 bits", given)
     array = given.astype(np.int64)
     _check_shape(name, array, [size])
     array.setflags(write=False)
@@ -87,6 +116,12 @@ def as_covariances(name: str, values: ArrayLike, count: int, size: int) -> Float
     reject_rows(name, asymmetric, "covariance is not symmetric")
     variance = np.diagonal(array, axis1=1, axis2=2)
     reject_rows(name, variance <= 0.0, "covariance is not positive definite")
+    reject_rows(
+        name,
+        (variance < SMALLEST_VARIANCE) | (variance > LARGEST_VARIANCE),
+        f"variance not between {SMALLEST_VARIANCE:g} and {LARGEST_VARIANCE:g}",
+        variance,
+    )
     # Of correlations, so that units do not matter.
     scale = 1.0 / np.sqrt(variance)
     correlation = scale[:, :, None] * array * scale[:, None, :]

@@ -36,7 +36,7 @@ def run(capsys, *arguments):
 
 
 def written(kind):
-    return sorted(["plot.toml", *(f"{name}.{kind}" for name in FIGURES)])
+    return sorted(["manifest.json", "plot.toml", *(f"{name}.{kind}" for name in FIGURES)])
 
 
 def names(folder):
@@ -126,11 +126,11 @@ def test_times_of_frames_from_a_file(tmp_path, capsys, files, images):
     third = load_results(files.results).timestamps[2]
     (tmp_path / "frames.csv").write_text(f"frame,timestamp\n5,{third}\n6,{third + 1e5}\n")
     code, said = run(
-        capsys, files.results, "--out", tmp_path, "--images", images,
+        capsys, files.results, "--out", tmp_path / "out", "--images", images,
         "--frame-times", tmp_path / "frames.csv", "--frames", "2",
     )  # fmt: skip
     assert (code, said.err) == (0, "")
-    assert names(tmp_path / "images") == ["left_005.png"]
+    assert names(tmp_path / "out" / "images") == ["left_005.png"]
 
 
 @pytest.mark.parametrize(

@@ -55,12 +55,13 @@ def test_options_of_a_look_stand_beside_it(settings, tmp_path, capsys):
     results = planted.write_planted(tmp_path).results
     before = (results / "config.toml").exists()
     given = settings(f'directory = "{results}"\nalign = "se2"\n')
-    assert main(["plot", *given, "--out", str(results), "--format", "png", "-q"]) == 0
+    figures = results / "figures"
+    assert main(["plot", *given, "--format", "png", "-q"]) == 0
     assert main(["view", *given, "--export", "page", "-q"]) == 0
     assert (results / "config.toml").exists() == before  # that is of `run`
     common = {"directory": str(results), "align": "se2"}
     for path, more in (
-        (results / "plot.toml", {"command": "plot", "out": str(results), "format": "png"}),
+        (figures / "plot.toml", {"command": "plot", "format": "png"}),
         (
             tmp_path / "page" / "view.toml",
             {"command": "view", "export": "page", "host": "127.0.0.1", "port": 8080},
@@ -69,11 +70,11 @@ def test_options_of_a_look_stand_beside_it(settings, tmp_path, capsys):
         written = tomllib.loads(path.read_text())
         written.pop("dqslam_version", None)
         assert written == common | more
-    figure, page = results / "map.png", tmp_path / "page" / "scene.js"
+    figure, page = figures / "map.png", tmp_path / "page" / "scene.js"
     first = page.read_bytes()
     figure.unlink()
     page.unlink()
-    assert main(["plot", "--config", str(results / "plot.toml"), "-q"]) == 0
+    assert main(["plot", "--config", str(figures / "plot.toml"), "-q"]) == 0
     assert main(["view", "--config", "page/view.toml", "-q"]) == 0
     assert figure.exists()
     assert page.read_bytes() == first

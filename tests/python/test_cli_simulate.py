@@ -46,6 +46,7 @@ def test_what_simulate_writes(tmp_path, capsys):
         "config.toml",
         "evaluate.toml",
         "groundtruth.txt",
+        "manifest.json",
         "objects.csv",
         "odometry.txt",
         "odometry_covariance.csv",

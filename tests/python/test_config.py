@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 import pytest
 from pydantic import BaseModel, ConfigDict, Field
 
-from dqslam.config import key_lines, load_toml_model, toml_text
+from dqslam.config import key_lines, load_toml_model, read_toml, toml_text
 from dqslam.io import FileError
 
 TEXT = '''# a comment with = and [brackets]
@@ -168,3 +168,10 @@ def test_what_is_written_is_read_again():
 def test_what_no_file_can_hold_is_refused():
     with pytest.raises(TypeError, match="no setting of a file"):
         toml_text({"x": object()})
+
+
+def test_brackets_without_end_are_an_error_of_the_file(tmp_path):
+    path = tmp_path / "deep.toml"
+    path.write_text("a = " + "[" * 5000)
+    with pytest.raises(FileError, match=r"deep\.toml: nested too deeply"):
+        read_toml(path)

@@ -1,4 +1,5 @@
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -124,6 +125,12 @@ def detections():
         class_names={2: "cup", 7: 'tv "[red]", big'},
         truncated=np.array([[0, 0, 0, 0]] * 3 + [[1, 0, 0, 1]]),
     )
+
+
+def test_a_name_of_two_lines_is_one_line_in_the_table(tmp_path):
+    boxes = replace(detections(), class_names={2: "a\nb", 7: "c\r\nd"})
+    save_estimate(estimate(inliers=INLIERS), tmp_path, detections=boxes, held_out=HELD_OUT)
+    assert load_results(tmp_path).boxes.class_name == ("a b", "a b", "c d", "c d")
 
 
 HELD_OUT = np.array([False, False, True, False])

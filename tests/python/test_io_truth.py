@@ -62,6 +62,8 @@ def test_yaw_is_about_z_and_kittis_about_y(tmp_path):
         ("id,x,y,z\n1.5,0,0,0\n", "objects.csv:2: id is 1.5, not a whole number"),
         ("x,y,z,sx,sy,sz\n0,0,0,1,0,1\n", "objects.csv:2: sx sy sz: a size is not positive"),
         ("x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,2\n", "objects.csv:2: the quaternion is not of length 1"),
+        ("x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,1e308\n", "objects.csv:2: the quaternion is not of"),
+        ("x,y,z,yaw,sx,sy,sz\n0,0,0,1e308,1,1,1\n", "objects.csv:2: yaw 1e308 is no angle"),
         ("x,y,z,static\n0,0,0,yes\n", "objects.csv:2: static is 'yes', not a number"),
         ("x,y,z,static\n0,0,0,2\n", "objects.csv:2: static is 2, not 0 or 1"),
     ],

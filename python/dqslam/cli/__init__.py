@@ -3,17 +3,18 @@
 The modules import heavy packages only inside functions, so that `dqslam --help` is fast.
 """
 
+import os
 import sys
 import warnings
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from functools import partial
+from collections.abc import Callable, Sequence
 from typing import Annotated, Any
 
 import typer
 
 from dqslam._files import FileErrors
 from dqslam._input import InputWarning
+from dqslam._manifest import ChangedFileWarning
+from dqslam._repr import printable
 from dqslam._version import version
 from dqslam.cli.ablation import ablation
 from dqslam.cli.convert import convert
@@ -42,6 +43,7 @@ EXIT_CODES = {
     2: "bad input: options, files, or a problem that they do not determine",
     3: "done, but the result of `run` is doubtful, or `inspect --strict` has found a mistake",
     130: "stopped by Ctrl-C",
+    141: "stopped, because the reader of its output has gone",
 }
 
 app = typer.Typer(
@@ -74,6 +76,7 @@ for _panel, _commands in COMMANDS.items():
 
 _INTERRUPTED = 130
 _BAD_INPUT = 2
+_READER_GONE = 141  # as of a program that SIGPIPE ends
 # UsageError, the base of BadParameter, has no public name in typer.
 _UsageError: Any = typer.BadParameter.__mro__[1]
 
@@ -84,9 +87,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Bad input gives one line on stderr, and a file of settings one line for each mistake. A mistake
     in dqslam itself keeps its traceback.
     """
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", ChangedFileWarning)
+        warnings.simplefilter("always", InputWarning)
+        # A number that overflows is refused where it is checked: that says more than NumPy does.
+        warnings.simplefilter("ignore", RuntimeWarning)
+        warnings.showwarning = _show_warning
+        return _run(arguments)
+
+
+def _run(arguments: Sequence[str] | None) -> int:
     try:
-        with _warnings_as_lines():
-            code = app(arguments, prog_name="dqslam", standalone_mode=False) or 0
+        code = app(arguments, prog_name="dqslam", standalone_mode=False) or 0
+        sys.stdout.flush()  # here, where an error can be caught
+    except (BrokenPipeError, SystemExit):  # click's way to say the same
+        _forget_output()
+        code = _READER_GONE
     except (KeyboardInterrupt, typer.Abort):
         code = _INTERRUPTED
     except (_UsageError, ValueError, OSError, RuntimeError) as error:
@@ -100,21 +116,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return int(code)
 
 
-@contextmanager
-def _warnings_as_lines() -> Iterator[None]:
-    with warnings.catch_warnings():
-        warnings.simplefilter("always", InputWarning)
-        warnings.showwarning = partial(_show_warning, warnings.showwarning)
-        yield
+def _forget_output() -> None:
+    """Let the rest of the output go nowhere, so that the interpreter's last flush is quiet."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, sys.stdout.fileno())
+    os.close(nowhere)
 
 
-def _show_warning(show: Any, message: Any, category: type[Warning], *where: Any) -> None:
-    """Show what a reader says of a file as one line, and other warnings as Python does."""
-    if issubclass(category, InputWarning):
-        print("warning:", " ".join(str(message).split()), file=sys.stderr)  # noqa: T201
-    else:
-        show(message, category, *where)
+def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
+    """Show a warning as one line for the user, without the place in the source."""
+    print("warning:", _in_a_line(str(message)), file=sys.stderr)  # noqa: T201
 
 
 def _say(message: str) -> None:
-    print("dqslam:", " ".join(message.split()), file=sys.stderr)  # noqa: T201
+    print("dqslam:", _in_a_line(message), file=sys.stderr)  # noqa: T201
+
+
+def _in_a_line(text: str) -> str:
+    return printable(" ".join(text.split()))

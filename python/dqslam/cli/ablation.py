@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dqslam._files import results_directory
+from dqslam._outputs import output_set
 from dqslam.cli.options import MOST_TRIALS, FirstSeed, Jobs, ResultDirectory
 from dqslam.cli.output import Json, Output, Quiet
-from dqslam.cli.results import save_study
+from dqslam.cli.results import save_study, show_written
 from dqslam.cli.settings import ConfigFile
 
 if TYPE_CHECKING:
@@ -38,16 +38,18 @@ def ablation(
     from dqslam.studies.ablation import run_ablation
 
     output = Output(quiet=quiet, as_json=json)
-    with results_directory(out), output.trials(trials) as progress:
-        table = run_ablation(
-            load_scenario("paper"),
-            trials=trials,
-            seed=seed,
-            jobs=jobs or os.cpu_count() or 1,
-            progress=progress,
-        )
-    output.table(_results(table))
-    save_study(context, output, table, out / "ablation.json", plot_ablation)
+    with output_set(out, "dqslam ablation") as folder:
+        with output.trials(trials) as progress:
+            table = run_ablation(
+                load_scenario("paper"),
+                trials=trials,
+                seed=seed,
+                jobs=jobs or os.cpu_count() or 1,
+                progress=progress,
+            )
+        output.table(_results(table))
+        why_not = save_study(context, output, table, folder / "ablation.json", plot_ablation)
+    show_written(output, out / "ablation.json", out / "ablation.png", why_not)
 
 
 def _results(table: "AblationTable") -> "Table":

@@ -92,6 +92,7 @@ def convert(
         body_from_camera=readings.body_from_camera,
         nms=nms,
         notes=notes,
+        files=tuple(one for one in inputs[1:] if one is not None),
     )
     with output.share("converting") as progress:
         written = io.convert(

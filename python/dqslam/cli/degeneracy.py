@@ -4,10 +4,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dqslam._files import results_directory
+from dqslam._outputs import output_set
 from dqslam.cli.options import MOST_TRIALS, FirstSeed, ResultDirectory
 from dqslam.cli.output import Json, Output, Quiet
-from dqslam.cli.results import save_study
+from dqslam.cli.results import save_study, show_written
 from dqslam.cli.settings import ConfigFile
 
 if TYPE_CHECKING:
@@ -35,10 +35,12 @@ def degeneracy(
     from dqslam.studies.degeneracy import run_degeneracy
 
     output = Output(quiet=quiet, as_json=json)
-    with results_directory(out), output.trials(trials) as progress:
-        table = run_degeneracy(trials=trials, seed=seed, progress=progress)
-    output.table(_results(table))
-    save_study(context, output, table, out / "degeneracy.json", plot_degeneracy)
+    with output_set(out, "dqslam degeneracy") as folder:
+        with output.trials(trials) as progress:
+            table = run_degeneracy(trials=trials, seed=seed, progress=progress)
+        output.table(_results(table))
+        why_not = save_study(context, output, table, folder / "degeneracy.json", plot_degeneracy)
+    show_written(output, out / "degeneracy.json", out / "degeneracy.png", why_not)
 
 
 def _results(table: "DegeneracyTable") -> "Table":

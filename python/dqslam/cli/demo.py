@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from dqslam._files import results_directory, uninterrupted
+from dqslam._outputs import output_set
 from dqslam.cli.options import FirstSeed, ResultDirectory
 from dqslam.cli.output import Json, Output, Quiet
-from dqslam.cli.results import draw_figure
+from dqslam.cli.results import draw_figure, show_written
 from dqslam.cli.settings import CONFIG, ConfigFile, save_settings
 
 if TYPE_CHECKING:
@@ -51,22 +51,21 @@ def demo(
 
     output = Output(quiet=quiet, as_json=json)
     scenario = load_scenario("paper")
-    with results_directory(out):
+    with output_set(out, "dqslam demo") as folder:
         with output.trials(drives) as progress:
             solved = []
             for one in range(seed, seed + drives):
                 solved.append(_drive(scenario, one))
                 progress(len(solved), drives)
         output.table(_table(solved))
-        with uninterrupted():
-            for drive in solved:
-                directory = out / f"seed{drive.seed}"
-                io.save_estimate(drive.estimate, directory, detections=drive.boxes)
-            io.write_json(out / "demo.json", {"drives": [_row(drive) for drive in solved]})
-            save_settings(context, out / CONFIG)
-            output.file(out / "demo.json")
-            maps = [(f"seed {drive.seed}", drive.estimate, drive.truth) for drive in solved]
-            draw_figure(output, out / "maps.png", lambda path: plot_maps(maps, path))
+        for drive in solved:
+            directory = folder / f"seed{drive.seed}"
+            io.save_estimate(drive.estimate, directory, detections=drive.boxes)
+        io.write_json(folder / "demo.json", {"drives": [_row(drive) for drive in solved]})
+        save_settings(context, folder / CONFIG)
+        maps = [(f"seed {drive.seed}", drive.estimate, drive.truth) for drive in solved]
+        why_not = draw_figure(output, folder / "maps.png", lambda path: plot_maps(maps, path))
+    show_written(output, out / "demo.json", out / "maps.png", why_not)
 
 
 def _drive(scenario: "Scenario", seed: int) -> _Drive:

@@ -5,12 +5,14 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from dqslam._files import uninterrupted
+from dqslam._outputs import added_files, check_added
 from dqslam.cli.output import Json, Output, Quiet
 from dqslam.cli.settings import ConfigFile, save_settings
 
 if TYPE_CHECKING:
     from rich.table import Table
+
+_WRITTEN = ("evaluation.json", "evaluation.toml")
 
 
 def evaluate(
@@ -75,6 +77,9 @@ def evaluate(
     if max_time_difference is not None and not max_time_difference >= 0.0:
         raise ValueError(f"--max-time-difference: {max_time_difference:g} is negative")
     output = Output(quiet=quiet, as_json=json)
+    inputs = (groundtruth, objects, boxes)
+    if directory.is_dir():
+        check_added(directory, _WRITTEN, "dqslam evaluate", inputs=inputs)
     with output.steps("evaluating", 3) as done:
         results = io.load_results(directory)
         done()
@@ -96,9 +101,9 @@ def evaluate(
     output.table(_boxes_and_objects(evaluation))
     if evaluation["objects"] is not None:
         output.table(_pairs(evaluation["objects"]["pairs"]))
-    with uninterrupted():
-        io.write_json(directory / "evaluation.json", evaluation)
-        save_settings(context, directory / "evaluation.toml")
+    with added_files(directory, _WRITTEN, "dqslam evaluate", inputs=inputs) as folder:
+        io.write_json(folder / "evaluation.json", evaluation)
+        save_settings(context, folder / "evaluation.toml")
     output.file(directory / "evaluation.json")
 
 

@@ -14,8 +14,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from dqslam._repr import printable, printable_json
+
 if TYPE_CHECKING:
-    from rich.console import RenderableType
+    from rich.console import Console, RenderableType
 
 Quiet = Annotated[
     bool, typer.Option("--quiet", "-q", help="Print nothing but errors.", rich_help_panel="Output")
@@ -26,6 +28,22 @@ Json = Annotated[
         "--json", help="Print one JSON document instead of tables.", rich_help_panel="Output"
     ),
 ]
+
+
+def _console() -> Console:
+    """Return a console that shows control characters of names and never sends them."""
+    from rich.console import Console
+    from rich.segment import Segment
+
+    class PrintableConsole(Console):
+        def render(self, *arguments: Any, **named: Any) -> Iterator[Segment]:
+            for segment in super().render(*arguments, **named):
+                if segment.control:
+                    yield segment
+                else:
+                    yield Segment(printable(segment.text, keep="\n"), segment.style)
+
+    return PrintableConsole()
 
 
 class Output:
@@ -47,20 +65,17 @@ class Output:
     def table(self, table: RenderableType) -> None:
         """Print a table."""
         if self._speaks:
-            from rich.console import Console
-
-            Console().print(table)
+            _console().print(table)
 
     def line(self, text: str, *, style: str | None = None) -> None:
         """Print a line as it is, without wrapping."""
         if self._speaks:
-            from rich.console import Console
-
-            Console().print(text, style=style, markup=False, highlight=False, soft_wrap=True)
+            shown = printable(text)
+            _console().print(shown, style=style, markup=False, highlight=False, soft_wrap=True)
 
     def warn(self, text: str) -> None:
         """Print a warning to the error stream, whatever else is printed."""
-        typer.secho(f"warning: {text}", fg="red", err=True)
+        typer.secho(f"warning: {printable(text)}", fg="red", err=True)
 
     def document(self, content: dict[str, Any]) -> None:
         """Print the JSON document if JSON is wanted; NaN and infinity become null."""
@@ -68,12 +83,12 @@ class Output:
             from dqslam.io.files import jsonable
 
             text = json.dumps(jsonable(content), indent=2, allow_nan=False, ensure_ascii=False)
-            typer.echo(text)
+            typer.echo(printable_json(text))
 
     def file(self, path: Path) -> None:
         """Print a JSON file that was written if JSON is wanted, or else its path."""
         if self._as_json:
-            typer.echo(path.read_text(encoding="utf-8"), nl=False)
+            typer.echo(printable_json(path.read_text(encoding="utf-8")), nl=False)
         self.line(f"wrote {path}")
 
     @contextmanager

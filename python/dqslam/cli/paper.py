@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from dqslam._files import results_directory, uninterrupted
+from dqslam._outputs import output_set
 from dqslam.cli.options import MOST_TRIALS, BackendName, FirstSeed, Jobs, ResultDirectory, Scheduler
 from dqslam.cli.output import Json, Output, Quiet
-from dqslam.cli.results import draw_figure
+from dqslam.cli.results import draw_figure, show_written
 from dqslam.cli.settings import CONFIG, ConfigFile, save_settings
 
 if TYPE_CHECKING:
@@ -111,30 +111,30 @@ def paper(
         "detector": chosen.detector.model_copy(update=wrong),
     }
     output = Output(quiet=quiet, as_json=json)
-    with results_directory(out), output.trials(trials) as progress:
-        table = run_paper(
-            chosen.model_copy(update=changes),
-            trials=trials,
-            seed=seed,
-            method=method,
-            loss=loss,
-            bound=bound,
-            jobs=jobs,
-            backend=backend,
-            scheduler=scheduler,
-            progress=progress,
-        )
-    output.table(_results(table))
-    if method == "paper":
-        output.table(_scan(table))
-    for row, title in ROWS.items():
-        for failed, why in table.best(row).failures.items():
-            output.line(f"failed: {title}, seed {failed}: {why}")
-    with uninterrupted():
-        table.save(out / "table.json")
-        save_settings(context, out / CONFIG)
-        output.file(out / "table.json")
-        _draw(table, out / "maps.png", output)
+    with output_set(out, "dqslam paper", inputs=[scenario]) as folder:
+        with output.trials(trials) as progress:
+            table = run_paper(
+                chosen.model_copy(update=changes),
+                trials=trials,
+                seed=seed,
+                method=method,
+                loss=loss,
+                bound=bound,
+                jobs=jobs,
+                backend=backend,
+                scheduler=scheduler,
+                progress=progress,
+            )
+        output.table(_results(table))
+        if method == "paper":
+            output.table(_scan(table))
+        for row, title in ROWS.items():
+            for failed, why in table.best(row).failures.items():
+                output.line(f"failed: {title}, seed {failed}: {why}")
+        table.save(folder / "table.json")
+        save_settings(context, folder / CONFIG)
+        why_not = _draw(table, folder / "maps.png", output)
+    show_written(output, out / "table.json", out / "maps.png", why_not)
 
 
 def _results(table: "PaperTable") -> "Table":
@@ -214,12 +214,12 @@ def _score_cells(score: "float | list[float] | dict[str, float]") -> list[str]:
     return [f"{number:.2f}" for number in numbers]
 
 
-def _draw(table: "PaperTable", path: Path, output: Output) -> None:
+def _draw(table: "PaperTable", path: Path, output: Output) -> str:
+    """Draw some of the trials; return why there is no figure, or nothing."""
     from dqslam.plot import plot_maps
     from dqslam.studies.paper import example_maps
 
     maps = example_maps(table, EXAMPLES)
     if not maps:
-        output.line(f"no {path.name}: no monocular trial succeeded")
-        return
-    draw_figure(output, path, lambda path: plot_maps(maps, path))
+        return f"no {path.name}: no monocular trial succeeded"
+    return draw_figure(output, path, lambda path: plot_maps(maps, path))

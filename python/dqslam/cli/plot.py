@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from dqslam._files import results_directory
+from dqslam._files import FileError, refuse_inputs
+from dqslam._manifest import check_files
+from dqslam._outputs import belongs_to, output_set
 from dqslam.cli.found import read_with_truth
 from dqslam.cli.options import (
     Alignment,
@@ -103,40 +105,58 @@ def plot(
         from dqslam.plot.overlay import check_video
 
         check_video(video)
+    if not directory.is_dir():
+        raise FileError(directory, "no such directory")
     output = Output(quiet=quiet, as_json=json)
     out = directory / "figures" if out is None else out
+    inputs = (directory, groundtruth, objects, images, frame_times)
+    if video is not None:
+        refuse_inputs(video, [*inputs, *_files_of(images)])
     left_out: dict[str, str] = {}
-    if _is_sweep(directory):
-        files = [_plot_sweep(directory, out, kind, parameter, output)]
-    else:
-        if parameter is not None:
-            raise ValueError(f"--parameter needs a sweep, which {directory} is not")
-        results, truth, true_objects = read_with_truth(directory, groundtruth, objects)
-        shown: dict[int, Path] = {}
-        if images is not None:  # fails before anything is written if poses are unclear
-            times = given_frame_times(frame_times, frame_rate)
-            shown = _choose(
-                frames, io.find_images(images, results.timestamps, times), is_film=video is not None
-            )
-        with output.share("drawing") as progress, results_directory(out):
-            drawn = plot_results(
-                results,
-                out,
-                kind=kind,
-                groundtruth=truth,
-                objects=true_objects,
-                align=align,
-                progress=progress,
-            )
-        files, left_out = list(drawn.written), drawn.left_out
-        if images is not None:
-            files += _overlay(results, shown, out, video, video_rate, output)
-    save_settings(context, out / "plot.toml")
+    with output_set(out, "dqslam plot", inputs=inputs) as folder:
+        if _is_sweep(directory):
+            files = [_plot_sweep(directory, folder, kind, parameter, output)]
+        else:
+            if parameter is not None:
+                raise ValueError(f"--parameter needs a sweep, which {directory} is not")
+            results, truth, true_objects = read_with_truth(directory, groundtruth, objects)
+            shown: dict[int, Path] = {}
+            if images is not None:
+                times = given_frame_times(frame_times, frame_rate)
+                found = io.find_images(images, results.timestamps, times)
+                shown = _choose(frames, found, is_film=video is not None)
+            with output.share("drawing") as progress:
+                drawn = plot_results(
+                    results,
+                    folder,
+                    kind=kind,
+                    groundtruth=truth,
+                    objects=true_objects,
+                    align=align,
+                    progress=progress,
+                )
+            files, left_out = list(drawn.written), drawn.left_out
+            if images is not None:
+                film = None if video is None else _moved(video, out, folder)
+                files += _overlay(results, shown, folder, film, video_rate, output)
+        save_settings(context, folder / "plot.toml")
+    belongs_to(directory, out)
+    files = [_moved(file, folder, out) for file in files]
     for name, why in left_out.items():
         output.line(f"no {name}: {why}")
     for file in files:
         output.line(f"wrote {file}")
     output.document({"figures": [str(file) for file in files], "left_out": left_out})
+
+
+def _files_of(folder: Path | None) -> list[Path]:
+    return sorted(folder.iterdir()) if folder is not None and folder.is_dir() else []
+
+
+def _moved(path: Path, source: Path, target: Path) -> Path:
+    """Return where a path in a folder is in another one; other paths stay."""
+    absolute, start = path.absolute(), source.absolute()
+    return target / absolute.relative_to(start) if start in absolute.parents else path
 
 
 def _is_sweep(directory: Path) -> bool:
@@ -147,9 +167,10 @@ def _plot_sweep(
     directory: Path, out: Path, kind: str, parameter: str | None, output: Output
 ) -> Path:
     from dqslam.plot.style import save_figure
-    from dqslam.plot.sweep import draw_sweep, read_summary
+    from dqslam.plot.sweep import SUMMARY, draw_sweep, read_summary
 
     path = out / f"sweep.{kind}"
+    check_files(directory, [SUMMARY])
     with output.waiting("drawing"):
         save_figure(draw_sweep(read_summary(directory), parameter), path)
     return path

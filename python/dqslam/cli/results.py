@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Protocol, TypeVar
 
 import typer
 
-from dqslam._files import uninterrupted
 from dqslam.cli.settings import CONFIG, save_settings
 
 if TYPE_CHECKING:
@@ -26,14 +25,13 @@ class Table(Protocol):
 SomeTable = TypeVar("SomeTable", bound=Table)
 
 
-def draw_figure(output: Output, path: Path, draw: Callable[[Path], None]) -> None:
-    """Draw an image file, or print why there is none: matplotlib is an extra."""
+def draw_figure(output: Output, path: Path, draw: Callable[[Path], None]) -> str:
+    """Draw an image file; return why there is none, or nothing: matplotlib is an extra."""
     if find_spec("matplotlib") is None:
-        output.line(f"no {path.name}: matplotlib is missing (pip install 'dqslam[plot]')")
-        return
+        return f"no {path.name}: matplotlib is missing (pip install 'dqslam[plot]')"
     with output.waiting("drawing"):
         draw(path)
-    output.line(f"wrote {path}")
+    return ""
 
 
 def save_study(
@@ -42,10 +40,14 @@ def save_study(
     table: SomeTable,
     path: Path,
     draw: Callable[[SomeTable, Path], None],
-) -> None:
-    """Write the table of a study, with its options and its figure beside it."""
-    with uninterrupted():
-        table.save(path)
-        save_settings(context, path.with_name(CONFIG))
-        output.file(path)
-        draw_figure(output, path.with_suffix(".png"), lambda image: draw(table, image))
+) -> str:
+    """Write the table of a study, with its options and its figure beside it; see `draw_figure`."""
+    table.save(path)
+    save_settings(context, path.with_name(CONFIG))
+    return draw_figure(output, path.with_suffix(".png"), lambda image: draw(table, image))
+
+
+def show_written(output: Output, table: Path, figure: Path, why_not: str) -> None:
+    """Print the table that was written, and the figure or why there is none."""
+    output.file(table)
+    output.line(why_not or f"wrote {figure}")

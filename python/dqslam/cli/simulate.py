@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dqslam._files import results_directory, uninterrupted, write_text
+from dqslam._files import write_text
+from dqslam._outputs import output_set
 from dqslam.cli.options import ResultDirectory
 from dqslam.cli.output import Json, Output, Quiet
 from dqslam.cli.settings import CONFIG, ConfigFile, save_settings
@@ -36,24 +37,24 @@ def simulate(
     Writes camera.json, odometry.txt, odometry_covariance.csv and boxes.csv; groundtruth.txt,
     objects.csv and true_boxes.csv; and run.toml and evaluate.toml for --config of these commands.
     """
-    from dqslam import io
     from dqslam.config import toml_text
+    from dqslam.io.simulated import write_recording, write_truth
     from dqslam.simulation.scenario import load_scenario
     from dqslam.simulation.simulator import simulate
 
     output = Output(quiet=quiet, as_json=json)
     chosen = load_scenario(scenario)
-    with results_directory(out), output.steps("simulating", 3) as done:
+    whole = output_set(out, "dqslam simulate", inputs=[scenario])
+    with whole as folder, output.steps("simulating", 3) as done:
         recording, truth = simulate(chosen, seed=seed)
         done()
-        with uninterrupted():
-            io.save_recording(recording, out)
-            done()
-            io.save_truth(truth, recording, out)
-            done()
-            for name, settings in _commands(out).items():
-                write_text(out / f"{name}.toml", toml_text(settings))
-            save_settings(context, out / CONFIG)
+        write_recording(recording, folder)
+        done()
+        write_truth(truth, recording, folder)
+        done()
+        for name, settings in _commands(out).items():
+            write_text(folder / f"{name}.toml", toml_text(settings))
+        save_settings(context, folder / CONFIG)
     summary = _summary(recording, truth)
     output.document({"scenario": chosen.name, "seed": seed, "out": str(out), **summary})
     for name, number in summary.items():

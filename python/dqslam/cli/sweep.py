@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dqslam._files import uninterrupted, write_text
+from dqslam._files import write_text
 from dqslam._input import read_text
+from dqslam._outputs import added_files, check_added, claim_folder
 from dqslam.cli.options import BackendName, Jobs, ResultDirectory, Scheduler
 from dqslam.cli.output import Json, Output, Quiet
 from dqslam.cli.settings import CONFIG, ConfigFile, save_settings
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 
     from dqslam.studies.sweep import CellSummary, SweepSummary
 
+COPY = "sweep.toml"
 NAMED = 5  # number of failures of one kind that are named
 
 
@@ -40,16 +42,23 @@ def sweep(
     and config.toml.
     """
     from dqslam.studies.sweep import load_sweep, run_sweep
+    from dqslam.studies.sweep.run import WRITTEN_BY
 
     asked = load_sweep(file)
+    is_copy = (out / COPY).exists() and file.exists() and (out / COPY).samefile(file)
+    names = [CONFIG] if is_copy else [COPY, CONFIG]
+    if out.is_dir():
+        claim_folder(out, WRITTEN_BY)
+        check_added(out, names, WRITTEN_BY)
     output = Output(quiet=quiet, as_json=json)
     with output.trials(len(asked.cells) * len(asked.seeds)) as progress:
         done = run_sweep(
             asked, out, jobs=jobs, backend=backend, scheduler=scheduler, progress=progress
         )
-    with uninterrupted():
-        write_text(out / "sweep.toml", read_text(file))
-        save_settings(context, out / CONFIG)
+    with added_files(out, names, WRITTEN_BY) as folder:
+        if not is_copy:
+            write_text(folder / COPY, read_text(file))
+        save_settings(context, folder / CONFIG)
     output.table(_table(done.summary))
     if done.found:
         output.line(f"{done.done} trials run, {done.found} were finished before")

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from dqslam._files import refuse_inputs
+from dqslam._outputs import belongs_to, check_output_set, output_set
 from dqslam.cli.found import read_with_truth
 from dqslam.cli.options import Alignment, TrueObjectsFile, TruthFile
 from dqslam.cli.output import Json, Output, Quiet
@@ -56,16 +58,27 @@ def view(
     """
     from dqslam import io
     from dqslam._colors import ESTIMATE
-    from dqslam.view import build_scene, rgb, write_page, write_rerun
+    from dqslam.view import build_scene, rgb, write_rerun
+    from dqslam.view.page import WRITTEN_BY, write_page_files
 
     output = Output(quiet=quiet, as_json=json)
+    inputs = (directory, groundtruth, objects)
+    read = [*inputs, *(directory.iterdir() if directory.is_dir() else ())]
+    for file in (rerun, ply):
+        if file is not None:
+            refuse_inputs(file, read)
+    if export is not None:
+        check_output_set(export, WRITTEN_BY, inputs=inputs)
     with output.waiting("reading"):
         results, truth, true_objects = read_with_truth(directory, groundtruth, objects)
         scene = build_scene(results, groundtruth=truth, objects=true_objects, align=align)
     written: dict[str, str] = {}
     if export is not None:
-        written["page"] = str(write_page(scene, export))
-        save_settings(context, export / "view.toml")
+        with output_set(export, WRITTEN_BY, inputs=inputs) as folder:
+            write_page_files(scene, folder)
+            save_settings(context, folder / "view.toml")
+        belongs_to(directory, export)
+        written["page"] = str(export / "index.html")
     if rerun is not None:
         with output.share("writing") as progress:
             write_rerun(scene, rerun, progress)

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dqslam._files import results_directory, uninterrupted
+from dqslam._outputs import output_set
 from dqslam.cli.options import BackendName, FirstSeed, Jobs, ResultDirectory, Scheduler
 from dqslam.cli.output import Json, Output, Quiet
 from dqslam.cli.settings import CONFIG, ConfigFile, save_settings
@@ -65,29 +65,29 @@ def worlds(
     if page is not None:  # before the work: does it have a place for the table?
         around_table(page)
     output = Output(quiet=quiet, as_json=json)
-    with results_directory(out), output.trials(len(scenarios) * trials) as progress:
-        summary = run_worlds(
-            scenarios,
-            trials=trials,
-            seed=seed,
-            rows=rows,
-            jobs=jobs,
-            backend=backend,
-            scheduler=scheduler,
-            progress=progress,
-        )
-    output.table(_table(summary))
-    for line in _failures(summary):
-        output.line(line)
-    with uninterrupted():
-        *tables, result = save_results(summary, out)
-        save_settings(context, out / CONFIG)
-        for path in tables:
-            output.line(f"wrote {path}")
-        output.file(result)
-        if page is not None:
-            replace_table(page, summary)
-            output.line(f"wrote {page}")
+    with output_set(out, "dqslam worlds", inputs=[*(names or ()), page]) as folder:
+        with output.trials(len(scenarios) * trials) as progress:
+            summary = run_worlds(
+                scenarios,
+                trials=trials,
+                seed=seed,
+                rows=rows,
+                jobs=jobs,
+                backend=backend,
+                scheduler=scheduler,
+                progress=progress,
+            )
+        output.table(_table(summary))
+        for line in _failures(summary):
+            output.line(line)
+        written = [out / path.name for path in save_results(summary, folder)]
+        save_settings(context, folder / CONFIG)
+    for path in written[:-1]:
+        output.line(f"wrote {path}")
+    output.file(written[-1])
+    if page is not None:
+        replace_table(page, summary)
+        output.line(f"wrote {page}")
 
 
 def _rows(given: list[str] | None) -> "tuple[RowName, ...] | None":

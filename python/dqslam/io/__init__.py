@@ -1,5 +1,6 @@
 """Files in and out: each format has a module, which states its conventions and errors."""
 
+from dqslam._manifest import ChangedFileWarning as ChangedFileWarning
 from dqslam.io.camera import CAMERA_FORMATS as CAMERA_FORMATS
 from dqslam.io.camera import read_camera as read_camera
 from dqslam.io.colmap_model import write_colmap_model as write_colmap_model
@@ -23,6 +24,7 @@ from dqslam.io.measurements import read_positions as read_positions
 from dqslam.io.mount import read_mount as read_mount
 from dqslam.io.nearest import nearest_pose as nearest_pose
 from dqslam.io.notes import InputWarning as InputWarning
+from dqslam.io.notes import LeftOut as LeftOut
 from dqslam.io.notes import Notes as Notes
 from dqslam.io.ply import write_ply as write_ply
 from dqslam.io.pose_graph import LandmarkEdges as LandmarkEdges

@@ -16,7 +16,7 @@ from dqslam.io.camera.rosbag import KIND as CAMERA_INFO
 from dqslam.io.colmap_model import write_colmap_model
 from dqslam.io.detections import DETECTION_FORMATS, DetectionTable, read_detections
 from dqslam.io.detections.rosbag import KIND as DETECTION_ARRAY
-from dqslam.io.files import FileError, whole_folder
+from dqslam.io.files import FileError, refuse_inputs, whole_folder
 from dqslam.io.formats import (
     Format,
     Progress,
@@ -73,6 +73,7 @@ class ConvertContext:
     odometry_covariance: str | Path | None = None  #: covariances of the steps, of results
     nms: float | None = None  #: boxes that overlap a better one by this much are left out
     notes: Notes = field(default_factory=Notes)  #: collects what is left out and what is doubtful
+    files: tuple[Path, ...] = ()  #: the files that these were read from, never written over
 
 
 def convert(
@@ -110,6 +111,8 @@ def convert(
         return _convert_results(source, out, to, context)
     if out.exists() and source.exists() and out.samefile(source):
         raise ValueError(f"{out}: the file would be written over itself")
+    for file in (out, _frames_file(out)):
+        refuse_inputs(file, [source, *context.files])
     kind = _kind(source, format, to)
     if kind is not None:
         target = _target(out, to, kind)
@@ -142,6 +145,7 @@ def _convert_results(
     """Write results for another program."""
     if to is None and out.suffix.lower() == ".g2o":
         to = "g2o"
+    refuse_inputs(out, [*source.iterdir(), context.odometry_covariance, *context.files])
     results = load_results(source)
     if to == "colmap-model":
         write_colmap_model(out, results)
@@ -299,6 +303,11 @@ def _beside(out: Path, target: Format[Any], frames: ArrayLike, times: ArrayLike)
     """Write the times into a file beside one whose format lacks them."""
     if "times" not in target.loses:
         return []
-    path = out.with_name(f"{out.stem}.frames.csv")
+    path = _frames_file(out)
     write_frame_times(path, frames, times)
     return [Written(path, "times of its frames, for --frame-times")]
+
+
+def _frames_file(out: Path) -> Path:
+    """Return the file of the times beside one whose format lacks them."""
+    return out.with_name(f"{out.stem}.frames.csv")

@@ -17,7 +17,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dqslam._exchange import new_stage, release, remove_stale_stages
 from dqslam._files import FileError as FileError
+from dqslam._files import refuse_inputs as refuse_inputs
 from dqslam._files import write_text as write_text
 from dqslam._input import read_text as read_text
 
@@ -82,17 +84,23 @@ def _blame_cell(path: str | Path, name: str, cells: Sequence[str], lines: Sequen
 @contextlib.contextmanager
 def whole_folder(path: str | Path) -> Iterator[Path]:
     """Give a temporary folder that becomes ``path`` in the end; ``path`` must be new or empty."""
-    path = Path(path)
-    if path.exists() and not (path.is_dir() and not any(path.iterdir())):
+    folder = Path(os.path.realpath(path))
+    if folder.exists() and not (folder.is_dir() and not any(folder.iterdir())):
         raise FileError(path, "is there already, and not empty")
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
-        yield temporary
-        temporary.replace(path)
+        remove_stale_stages(folder)
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        stage, lock = new_stage(folder, inside=False)
+    except OSError as error:
+        raise FileError(path, f"cannot be written: {error.strerror}") from None
+    try:
+        yield stage
+        stage.replace(folder)
     except OSError as error:
         raise FileError(path, f"cannot be written: {error.strerror}") from None
     finally:
-        shutil.rmtree(temporary, ignore_errors=True)
+        shutil.rmtree(stage, ignore_errors=True)
+        release(lock)
 
 
 def write_json(path: str | Path, content: dict[str, Any]) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 
 from dqslam import _core
 from dqslam._checks import Floats
+from dqslam._outputs import added_files, output_set
 from dqslam.io.camera.table import write_json_camera
 from dqslam.io.detections.csv import COLUMNS, write_csv
 from dqslam.io.detections.table import DetectionTable
@@ -20,6 +21,8 @@ from dqslam.io.trajectory import write_trajectory
 from dqslam.lens import distort_boxes
 from dqslam.recording import Recording, Truth
 
+TRUTH_FILES = ("groundtruth.txt", "objects.csv", "true_boxes.csv")
+
 
 def save_recording(recording: Recording, directory: str | Path) -> None:
     """Write camera.json, odometry.txt, odometry_covariance.csv and boxes.csv: see `load_recording`.
@@ -27,12 +30,21 @@ def save_recording(recording: Recording, directory: str | Path) -> None:
     The odometry is written as the poses that it leads to, world_from_camera. The id of an object is
     its track_id. Boxes are those of the image as recorded. Relative positions are left out.
 
+    The files of an earlier call are replaced, all at once if the directory has no others.
+
     Raises
     ------
     ValueError
         If a box reaches beyond the range of the lens; then nothing is written.
+    FileError
+        If the directory has files of these names that are others' or have been changed.
     """
-    directory = Path(directory)
+    with output_set(directory, "save_recording", beside_others=True) as folder:
+        write_recording(recording, folder)
+
+
+def write_recording(recording: Recording, directory: Path) -> None:
+    """Write the files of a recording into a folder that has none of them."""
     odometry, boxes = recording.odometry, recording.detections
     recorded = distort_boxes(recording.camera, boxes.box)
     path = _core.dead_reckon(odometry.pose_model, odometry.first_pose, odometry.relative)
@@ -58,9 +70,20 @@ def save_truth(truth: Truth, recording: Recording, directory: str | Path) -> Non
     """Write groundtruth.txt, objects.csv and true_boxes.csv, for `dqslam evaluate`.
 
     An object that is neither an ellipsoid nor a cuboid has the size of a cube of its volume, and no
-    orientation.
+    orientation. Files of an earlier call are replaced.
+
+    Raises
+    ------
+    FileError
+        If the directory has files of these names that are others' or have been changed.
     """
-    directory = Path(directory)
+    names = TRUTH_FILES if truth.box_object_id is not None else TRUTH_FILES[:2]
+    with added_files(directory, names, "save_truth") as folder:
+        write_truth(truth, recording, folder)
+
+
+def write_truth(truth: Truth, recording: Recording, directory: Path) -> None:
+    """Write the files of the truth into a folder that has none of them."""
     _write_path(directory / "groundtruth.txt", recording, truth.pose_model, truth.poses)
     names = ["object_id", "class_name", "x", "y", "z", "sx", "sy", "sz"]
     columns: list[Sequence[object]] = [truth.object_id.tolist(), truth.class_name]

@@ -31,6 +31,7 @@ import numpy as np
 
 from dqslam import _core
 from dqslam._checks import Bools, Floats, Ints
+from dqslam._limits import LARGEST_ANGLE_RAD
 from dqslam.io.csv_table import CsvTable, read_csv
 from dqslam.io.files import FileError
 from dqslam.lens import undistort_boxes
@@ -149,10 +150,13 @@ def _rotations(table: CsvTable) -> Floats | None:
 
     if all(name in table for name in QUATERNION):
         xyzw = _columns(table, QUATERNION)
-        off = np.abs(np.linalg.norm(xyzw, axis=1) - 1.0) > NORM_TOLERANCE
+        with np.errstate(over="ignore"):  # an infinite length is not 1
+            off = np.abs(np.linalg.norm(xyzw, axis=1) - 1.0) > NORM_TOLERANCE
         table.reject(off, "the quaternion is not of length 1")
         return np.asarray(Rotation.from_quat(xyzw).as_matrix())
     if "yaw" not in table:
         return None
     axis = [0.0, 1.0, 0.0] if _first(table, SIZES) == KITTI_SIZES else [0.0, 0.0, 1.0]
-    return np.asarray(Rotation.from_rotvec(np.outer(table.numbers("yaw"), axis)).as_matrix())
+    yaw = table.numbers("yaw")
+    table.reject(np.abs(yaw) > LARGEST_ANGLE_RAD, "yaw {} is no angle in radians", "yaw")
+    return np.asarray(Rotation.from_rotvec(np.outer(yaw, axis)).as_matrix())

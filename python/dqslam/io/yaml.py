@@ -75,4 +75,6 @@ def _check_events(path: str | Path, yaml: Any, text: str) -> None:
 
 def _no_value(path: str | Path, error: Exception) -> FileError:
     """Return the error of a scalar that is none: !!bool x, !!int x, 2024-99-99 and the like."""
-    return FileError(path, f"not YAML: a value cannot be read ({str(error)[:80]})")
+    return FileError(
+        path, f"not YAML: a value cannot be read ({' '.join(str(error)[:80].split())})"
+    )

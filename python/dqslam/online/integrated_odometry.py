@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,9 @@ from dqslam import _core
 from dqslam._checks import Floats
 from dqslam.association.noise import translation_axes
 from dqslam.recording import pose_size, tangent_size
+
+# A heading is the same without its whole turns; so many would lose its digits.
+_MANY_TURNS_RAD = 1e3
 
 
 def identity_pose(pose_model: _core.PoseModel) -> Floats:
@@ -42,8 +46,8 @@ class IntegratedOdometry:
         k = len(covariance)
         is_translation = np.arange(k) < translation_axes(k)
         step = np.array([covariance, np.diag(is_translation), np.diag(~is_translation)])
+        end = _core.compose(pose_model, self.relative[None], relative[None])[0]
+        if pose_model == _core.PoseModel.SE2 and abs(end[2]) > _MANY_TURNS_RAD:
+            end[2] = math.remainder(end[2], 2.0 * math.pi)
         moved = _core.adjoint(pose_model, _core.inverse(pose_model, relative[None]))[0]
-        return IntegratedOdometry(
-            _core.compose(pose_model, self.relative[None], relative[None])[0],
-            moved @ self.covariances @ moved.T + step,
-        )
+        return IntegratedOdometry(end, moved @ self.covariances @ moved.T + step)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,7 +12,9 @@ from numpy.typing import ArrayLike
 from dqslam import _core
 from dqslam._checks import Floats
 from dqslam._ids import ObjectId, ObjectRow
-from dqslam.io import FileError, load_results, save_estimate
+from dqslam.estimate import Estimate
+from dqslam.io import FileError, save_estimate
+from dqslam.io.results import load_map_results
 from dqslam.lens import camera_with, lens_of
 from dqslam.online.readout import read_estimate
 from dqslam.online.state import State
@@ -49,10 +52,11 @@ def load_map(directory: str | Path, robot_from_camera: ArrayLike | None = None) 
     of the orientation follows from these and the ratios of the axes. A result does not have the
     mount of the camera, which is the identity by default.
     """
-    results = load_results(directory)
+    results = load_map_results(directory)
     objects = results.objects
     rows = np.flatnonzero(objects.is_ellipsoid)
-    if not rows.size:
+    is_of_no_steps = not len(results.timestamps) and not len(objects)
+    if not rows.size and not is_of_no_steps:
         raise FileError(Path(directory) / "map.json", "has no ellipsoid")
     covariances = np.zeros((len(rows), 9, 9))
     for covariance, row in zip(covariances, rows, strict=True):
@@ -106,29 +110,49 @@ def add_map(state: State, known: KnownMap) -> None:
         state.store.add_map_object(state.registry.row_of[one], name, covariance)
 
 
-def object_covariances(state: State) -> dict[ObjectRow, Floats]:
-    """Return the covariance (9, 9) of each object of a session that has one.
+@dataclass(frozen=True, eq=False)
+class MapOfSession:
+    """The map of a session at one time, which the session does not change any more."""
 
-    For a continued map, they are the loaded ones, because the problem does not have its priors.
-    """
-    core, known = state.core, state.store.map_covariance
-    if core.num_poses == 0 or known:
-        return known
-    graph, rows = core.to_graph()
-    if not rows:
-        return {}
-    at = _core.State(core.poses, core.ellipsoids[rows])
-    found = _core.covariance(graph, state.settings.solve_options, at).objects.reshape(-1, 9, 9)
-    determined = np.isfinite(found).all(axis=(1, 2))
-    return {ObjectRow(rows[place]): found[place] for place in np.flatnonzero(determined)}
+    estimate: Estimate
+    rows: list[ObjectRow]
+    """Row of each object of the estimate in the session."""
+    known: dict[ObjectRow, Floats]
+    """Covariances (9, 9) of a continued map: the problem does not have its priors."""
+    problem: tuple[_core.Graph, list[int], _core.State] | None
+    """Otherwise the problem, the rows of its objects, and the estimate; None without poses."""
+    options: _core.SolveOptions
 
+    @classmethod
+    def of(cls, state: State) -> Self:
+        """Copy the map of a session."""
+        estimate, core, problem = read_estimate(state), state.core, None
+        if core.num_poses and not state.store.map_covariance:
+            graph, rows = core.to_graph()
+            problem = (graph, rows, _core.State(core.poses, core.ellipsoids[rows]))
+        return cls(
+            estimate=estimate,
+            rows=[state.registry.row_of[one] for one in estimate.object_ids.tolist()],
+            known=dict(state.store.map_covariance),
+            problem=problem,
+            options=state.settings.solve_options,
+        )
 
-def save_map(state: State, directory: str | Path) -> None:
-    """Write the estimate of a session with the covariances of its objects."""
-    estimate = read_estimate(state)
-    covariances = object_covariances(state)
-    unknown = np.full((9, 9), np.nan)
-    rows = [state.registry.row_of[one] for one in estimate.object_ids.tolist()]
-    objects = np.array([covariances.get(row, unknown) for row in rows]).reshape(-1, 9, 9)
-    poses = np.full((len(estimate.poses), *(tangent_size(estimate.pose_model),) * 2), np.nan)
-    save_estimate(estimate, directory, marginals=_Covariances(poses, objects))
+    def covariances(self) -> dict[ObjectRow, Floats]:
+        """Return the covariance (9, 9) of each object that has one."""
+        if self.problem is None:
+            return self.known
+        graph, rows, at = self.problem
+        if not rows:
+            return {}
+        found = _core.covariance(graph, self.options, at).objects.reshape(-1, 9, 9)
+        determined = np.isfinite(found).all(axis=(1, 2))
+        return {ObjectRow(rows[place]): found[place] for place in np.flatnonzero(determined)}
+
+    def save(self, directory: str | Path) -> None:
+        """Write the estimate with the covariances of its objects."""
+        covariances, unknown = self.covariances(), np.full((9, 9), np.nan)
+        objects = np.array([covariances.get(row, unknown) for row in self.rows]).reshape(-1, 9, 9)
+        k = tangent_size(self.estimate.pose_model)
+        poses = np.full((len(self.estimate.poses), k, k), np.nan)
+        save_estimate(self.estimate, directory, marginals=_Covariances(poses, objects))

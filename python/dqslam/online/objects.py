@@ -71,9 +71,10 @@ class Registry:
         return [self.row_of[one] if one in self.row_of else new[one] for one in ids], first
 
     def register(self, ids: Iterable[ObjectId]) -> None:
-        """Add objects by their ids."""
+        """Add objects by their ids. One whose id another has already gets a free one."""
         for one in ids:
-            name = ObjectId(max(self.ids, default=-1) + 1) if one == ANY_ID else one
+            is_free = one != ANY_ID and one not in self.row_of
+            name = one if is_free else ObjectId(max(self.ids, default=-1) + 1)
             self.row_of[name] = ObjectRow(len(self.ids))
             self.ids.append(name)
             self.votes.append(Counter())

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass
-from threading import Thread
 
 import numpy as np
 
@@ -101,10 +100,20 @@ class Polisher:
         self._polish: Polish | None = None
         self._found: Future[Polished] = Future()
 
-    def start(self, polish: Polish, *, background: bool) -> Future[Polished]:
-        """Run a polish now, or in a thread: the core releases the GIL."""
-        found = self._found = Future()
-        self._polish = polish
+    @property
+    def running(self) -> Future[Polished] | None:
+        """The result of a polish that is not done, to wait for; None if there is none."""
+        return None if self._polish is None or self._found.done() else self._found
+
+    @property
+    def is_done(self) -> bool:
+        """Whether a polish is done and waits to be merged."""
+        return self._polish is not None and self._found.done()
+
+    def begin(self, polish: Polish) -> tuple[Callable[[], None], Future[Polished]]:
+        """Return the work of a polish, which may run in any thread, and its result."""
+        found: Future[Polished] = Future()
+        self._found, self._polish = found, polish
 
         def run() -> None:
             try:
@@ -112,17 +121,16 @@ class Polisher:
             except BaseException as error:  # raised by result()
                 found.set_exception(error)
 
-        if background:
-            Thread(target=run, name="dqslam-polish", daemon=True).start()
-        else:
-            run()
-            self.take()
-        return found
+        return run, found
 
-    def take(self, *, wait: bool = False) -> None:
-        """Merge the result of the last polish, if it is done."""
+    def take(self) -> None:
+        """Merge the result of the last polish, if it is done. One that has failed changes nothing.
+
+        Its error is raised by the ``result()`` of its future, not here.
+        """
         polish = self._polish
-        if polish is None or not (wait or self._found.done()):
+        if polish is None or not self._found.done():
             return
         self._polish = None
-        polish.merge(self._found.result())
+        if self._found.exception() is None:
+            polish.merge(self._found.result())

@@ -26,9 +26,8 @@ def read_assignments(state: State) -> list[Ints]:
     """Return the ids of the objects that the boxes of each step show, as known now; -1 for none."""
     ids = np.array([*state.registry.ids, -1], dtype=np.int64)
     store, labels = state.store, state.store.labels
-    assignments = list(state.given_ids)
+    assignments = [one.copy() for one in state.given_ids]
     for step, (boxes, tracklets) in store.images.items():
-        assignments[step] = assignments[step].copy()
         assignments[step][boxes] = ids[labels.object_of_tracklet[tracklets]]
     ends = np.searchsorted(store.box_keyframe, np.arange(1, len(store.keyframes)))
     for keyframe, rows in zip(store.keyframes, np.split(labels.object_rows, ends), strict=False):

@@ -22,7 +22,8 @@ def refine_all(state: State) -> Polish:
     settings, scene, num_objects = state.settings, local.scene, state.core.num_objects
 
     def work() -> Polished:
-        refine(scene, Follower(trust=settings.trust))
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # as in each step
+            refine(scene, Follower(trust=settings.trust))
         row_of = commit(trial, local)
         graph, seen = trial.core.to_graph()
         if not seen:

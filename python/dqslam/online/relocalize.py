@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from dqslam import _core
 from dqslam._checks import Floats, Ints
 from dqslam.online.inputs import box_noise_rows, check_boxes
-from dqslam.online.maps import object_covariances
+from dqslam.online.maps import MapOfSession
 from dqslam.online.readout import read_objects
 from dqslam.online.state import State
 from dqslam.online.step import StepBoxes
@@ -40,14 +40,22 @@ class Relocation:
     def with_ids(self, boxes: StepBoxes) -> StepBoxes:
         """Return the boxes that show objects of the map, with the ids of these objects."""
         known = np.flatnonzero(self.object_id >= 0)
-        some = check_boxes(replace(boxes, object_id=self.object_id)).select(known)
-        return StepBoxes(some.box, some.object_id, some.class_name, some.truncated)
+        count = len(self.object_id)
+        names = boxes.class_name or ("object",) * count
+        truncated = np.zeros((count, 4)) if boxes.truncated is None else boxes.truncated
+        return StepBoxes(
+            np.asarray(boxes.box)[known],
+            self.object_id[known],
+            [names[row] for row in known.tolist()],
+            np.asarray(truncated)[known],
+        )
 
 
 def relocalize(state: State, boxes: StepBoxes) -> Relocation:
     """Find the pose; see ``OnlineSlam.relocalize``."""
-    settings, objects, checked = state.settings, read_objects(state), check_boxes(boxes)
-    known = object_covariances(state)
+    settings, objects = state.settings, read_objects(state)
+    checked = check_boxes(boxes, settings.camera)
+    known = MapOfSession.of(state).covariances()
     covariances = [known.get(row, _UNKNOWN_COVARIANCE) for row in state.object_rows]
     ids, names = objects.object_ids, np.array(objects.class_names, dtype=np.str_)
     candidates = [

@@ -2,40 +2,47 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from concurrent.futures import Future
+import copy
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, wait
 from pathlib import Path
+from threading import RLock, Thread
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from dqslam import _core
-from dqslam._checks import Floats, Ints, require
-from dqslam._repr import counted
+from dqslam._checks import require
 from dqslam.association import FINAL, UNSURE
-from dqslam.assumptions import BoxNoise, OdometryNoise, SizePrior, SizePriors
-from dqslam.estimate import Estimate
+from dqslam.assumptions import BoxNoise, SizePrior, SizePriors
 from dqslam.online.identify import Identifier
 from dqslam.online.inputs import path_begin
 from dqslam.online.keyframes import KeyframeStore
-from dqslam.online.maps import add_map, load_map, save_map
-from dqslam.online.objects import Objects, Registry
-from dqslam.online.polish import Polished, Polisher, smooth_all, solve_all
-from dqslam.online.readout import read_assignments, read_estimate, read_objects
+from dqslam.online.locked import locked
+from dqslam.online.maps import MapOfSession, add_map, load_map
+from dqslam.online.objects import Registry
+from dqslam.online.polish import Polish, Polished, Polisher, smooth_all, solve_all
+from dqslam.online.reader import SessionReader
 from dqslam.online.refinement import refine_all
 from dqslam.online.relocalize import Relocation, relocalize
-from dqslam.online.state import Settings, State
+from dqslam.online.state import Settings, State, with_loss
 from dqslam.online.step import Motion, StepBoxes, StepMeasurements, StepPositions
-from dqslam.online.stepping import take_step
+from dqslam.online.stepping import check_step, take_step
 from dqslam.recording import pose_model_of, pose_size
 
+_IN_SPACE = (pose_size(_core.PoseModel.SE3),)
 
-class OnlineSlam:
+
+class OnlineSlam(SessionReader):
     """Object SLAM step by step.
 
     Each ``add`` does bounded work. After it, ``pose``, ``poses`` and ``objects`` have an estimate.
     Objects have a size prior from their first box, so the estimate is always determined.
+
+    Any number of threads may use a session. One lock lets a method wait until no other thread is in
+    one, so that readers never see half a step. A polish, in the background or not, works on a copy
+    and holds the lock only while it begins and while its result is merged.
 
     Parameters
     ----------
@@ -94,6 +101,7 @@ class OnlineSlam:
     ) -> None:
         """Begin a session that has no step yet."""
         self._arguments = {name: value for name, value in locals().items() if name != "self"}
+        self._lock = RLock()
         require(camera, _core.Camera, "OnlineSlam", "OnlineSlam(recording.camera)")
         if not 0.5 < trust_ids <= FINAL:
             raise ValueError(f"trust in ids is {trust_ids:g}, not above 0.5 and at most 1")
@@ -109,7 +117,7 @@ class OnlineSlam:
             raise ValueError("online: only the ellipsoid model has a prior on size")
         online = _core.OnlineOptions() if online is None else online
         if self.solve_options.loss != _core.Loss.NONE and online.loss_scale == 0.0:
-            online = _with_loss(online, self.solve_options.loss_scale)
+            online = with_loss(online, self.solve_options.loss_scale)
         scene = _core.ScenePriors() if scene_priors is None else scene_priors
         are_final = trust_ids == FINAL
         settings = Settings(
@@ -122,18 +130,21 @@ class OnlineSlam:
             trust=FINAL if are_final and finds_movers else min(trust_ids, UNSURE),
             estimates_noise=estimates_noise,
         )
+        begin = path_begin(pose_model, first_pose, first_covariance)
         self._state = State(
             settings,
-            path_begin(pose_model, first_pose, first_covariance),
+            begin,
             _core.Session(pose_model, camera, scene, online),
             Registry(),
             KeyframeStore(size_prior),
+            odometry_end=begin[0],
         )
         self._identifier = Identifier(self._state)
         self._polisher = Polisher()
         if not settings.believes_ids:
             import scipy.optimize  # noqa: F401, half a second that no step should take
 
+    @locked
     def add(
         self,
         odometry: Motion | None,
@@ -160,108 +171,42 @@ class OnlineSlam:
         Raises
         ------
         StepError
-            If the time does not increase, if odometry is missing, if numbers are not finite, or if
-            a box is invalid. The session is then unchanged.
+            If the time does not increase, if odometry is missing, if numbers are not finite or
+            beyond their limits (docs/reliability.md), or if a box is invalid or outside the image.
+            The session is then unchanged, to the bit.
         """
         for given, kind in ((odometry, Motion), (boxes, StepBoxes), (positions, StepPositions)):
             if given is not None:
                 hint = "slam.add(step.odometry, step.boxes, timestamp=step.timestamp)"
                 require(given, kind, "OnlineSlam.add", hint)
-        if not len(self):
-            self._first_step = (boxes, timestamp, positions, measurements)
-        elif self._may_leave_plane and odometry is not None:
-            self._settle_pose_model(odometry)
-        self._polisher.take()
-        return take_step(
-            self._state, self._identifier, odometry, boxes, timestamp, positions, measurements
-        )
+        step = (odometry, boxes, timestamp, positions, measurements)
+        is_unsettled = len(self) > 0 and self._may_leave_plane
+        if is_unsettled and odometry is not None and np.shape(odometry.relative) == _IN_SPACE:
+            return self._begin_in_space(step)
+        is_done = self._polisher.is_done
+        checked, prepared = check_step(self._state, *step, dry_run=is_done)
+        if not len(self):  # copied, because the caller may write the next image into its arrays
+            self._first_step = copy.deepcopy(step)
+        elif odometry is not None:
+            self._may_leave_plane = False
+        if is_done:
+            self._polisher.take()
+        return take_step(self._state, self._identifier, checked, prepared)
 
-    def _settle_pose_model(self, odometry: Motion) -> None:
-        """Begin again in SE(3) if the first motion is in SE(3)."""
-        self._may_leave_plane = False
-        if np.shape(odometry.relative) == (pose_size(_core.PoseModel.SE3),):
-            space = OnlineSlam(**self._arguments | {"pose_model": _core.PoseModel.SE3})
-            boxes, timestamp, positions, measurements = self._first_step
-            space.add(
-                None,
+    def _begin_in_space(self, step: tuple[Any, ...]) -> _core.StepReport:
+        """Begin again in SE(3), because the first motion is; nothing changes if it is refused."""
+        space = OnlineSlam(**self._arguments | {"pose_model": _core.PoseModel.SE3})
+        for one in (self._first_step, step):
+            odometry, boxes, timestamp, positions, measurements = one
+            report = space.add(
+                odometry,
                 boxes,
                 timestamp=timestamp,
                 positions=positions,
                 measurements=measurements,
             )
-            vars(self).update(vars(space))
-
-    # ------------------------------------------------------------------------------ estimate
-
-    def __repr__(self) -> str:
-        """Show the pose model, and how many steps and objects there are."""
-        steps, objects = counted(len(self), "step"), counted(self.num_objects, "object")
-        return f"OnlineSlam({self.pose_model.name}, {steps}, {objects})"
-
-    def __len__(self) -> int:
-        """Return the number of steps."""
-        return len(self._state.timestamps)
-
-    @property
-    def timestamps(self) -> Floats:
-        """Seconds, shape (n,)."""
-        return np.array(self._state.timestamps)
-
-    @property
-    def pose(self) -> Floats:
-        """world_from_robot of the last step, shape (d,); the first pose before any step."""
-        if not len(self):
-            return self._state.begin[0]
-        return np.asarray(self._state.core.pose_at(len(self) - 1))
-
-    @property
-    def poses(self) -> Floats:
-        """world_from_robot of every step, shape (n, d)."""
-        return self._state.core.poses
-
-    @property
-    def objects(self) -> Objects:
-        """The present estimate of the objects."""
-        return read_objects(self._state)
-
-    @property
-    def num_objects(self) -> int:
-        """The number of objects."""
-        return len(self._state.object_rows)
-
-    @property
-    def left_out(self) -> dict[int, str]:
-        """Reasons why objects do not fit a world at rest, by id; their boxes are not used."""
-        return self._state.left_out
-
-    @property
-    def shown(self) -> Ints:
-        """Id of the object that each box of the last step shows, -1 if it waits; shape (b,)."""
-        return self._state.shown
-
-    @property
-    def assignments(self) -> list[Ints]:
-        """Id of the object that each box of each step shows, as known now; -1 for none."""
-        return read_assignments(self._state)
-
-    @property
-    def keyframes(self) -> Ints:
-        """Steps that are keyframes of the association, shape (f,)."""
-        return np.array([one.pose for one in self._state.store.keyframes], dtype=np.int64)
-
-    @property
-    def size_prior(self) -> SizePrior | SizePriors:
-        """The size prior of new objects, which is given or learned from earlier objects."""
-        return self._state.store.size_prior or self._state.prior
-
-    @property
-    def odometry_noise(self) -> OdometryNoise | None:
-        """The estimated noise of a step; None if it is not estimated."""
-        return self._state.odometry_noise
-
-    def estimate(self) -> Estimate:
-        """Return the estimate in the form of ``solve``, with objects by ascending ids."""
-        return read_estimate(self._state)
+        vars(self).update({k: value for k, value in vars(space).items() if k != "_lock"})
+        return report
 
     def polish(self, *, background: bool = False) -> Future[Polished]:
         """Solve the complete problem, starting from the state of the session.
@@ -270,18 +215,40 @@ class OnlineSlam:
         arrived in the meantime move rigidly with it. ``result()`` of the returned future waits for
         the result. Without steps or boxes, nothing is done.
         """
-        self._polisher.take(wait=True)
+        work, found = self._begin_polish()
+        if background:
+            Thread(target=work, name="dqslam-polish", daemon=True).start()
+            return found
+        work()
+        self._merge_polish()
+        found.result()
+        return found
+
+    def _begin_polish(self) -> tuple[Callable[[], None], Future[Polished]]:
+        """Prepare a polish when none is running; others may use the session until then."""
+        while True:
+            with self._lock:
+                running = self._polisher.running
+                if running is None:
+                    return self._polisher.begin(self._prepare_polish())
+            wait([running])
+
+    def _prepare_polish(self) -> Polish:
+        self._polisher.take()
         state = self._state
         if state.store.map_covariance:
-            polish = smooth_all(state.core)
-        elif state.store.keyframes:
-            polish = refine_all(state)
-        else:
-            polish = solve_all(state.core, self.solve_options)
-        return self._polisher.start(polish, background=background)
+            return smooth_all(state.core)
+        if state.store.keyframes:
+            return refine_all(state)
+        return solve_all(state.core, self.solve_options)
+
+    @locked
+    def _merge_polish(self) -> None:
+        self._polisher.take()
 
     # ------------------------------------------------------------------------------ maps
 
+    @locked
     def relocalize(self, boxes: StepBoxes) -> Relocation:
         """Find the pose from which boxes of mapped objects were seen, by their ids or classes.
 
@@ -293,8 +260,13 @@ class OnlineSlam:
         return relocalize(self._state, boxes)
 
     def save(self, directory: str | Path) -> None:
-        """Write the estimate and its covariances, as ``save_estimate`` does."""
-        save_map(self._state, directory)
+        """Write the estimate and its covariances, as ``save_estimate`` does.
+
+        Steps may be added meanwhile. They are not in the files.
+        """
+        with self._lock:
+            found = MapOfSession.of(self._state)
+        found.save(directory)
 
     @classmethod
     def load(
@@ -331,15 +303,8 @@ class OnlineSlam:
         if first_boxes is not None:
             if settings.get("first_pose") is None:
                 found = slam.relocalize(first_boxes)
-                slam._state.begin = path_begin(slam.pose_model, found.pose, found.covariance)
+                begin = path_begin(slam.pose_model, found.pose, found.covariance)
+                slam._state.begin, slam._state.odometry_end = begin, begin[0]
                 first_boxes = found.with_ids(first_boxes)
             slam.add(None, first_boxes)
         return slam
-
-
-def _with_loss(online: _core.OnlineOptions, loss_scale: float) -> _core.OnlineOptions:
-    """Return the options with another scale of the loss on boxes."""
-    names = [name for name in dir(online) if not name.startswith("_")]
-    return _core.OnlineOptions(
-        **{name: getattr(online, name) for name in names} | {"loss_scale": loss_scale}
-    )

@@ -33,6 +33,14 @@ class Settings:
     """Whether the level of the odometry's noise is estimated from boxes."""
 
 
+def with_loss(online: _core.OnlineOptions, loss_scale: float) -> _core.OnlineOptions:
+    """Return the options with another scale of the loss on boxes."""
+    names = [name for name in dir(online) if not name.startswith("_")]
+    return _core.OnlineOptions(
+        **{name: getattr(online, name) for name in names} | {"loss_scale": loss_scale}
+    )
+
+
 @dataclass(eq=False)
 class State:
     """The state of a session."""
@@ -46,6 +54,8 @@ class State:
     """The id of each object of the core."""
     store: KeyframeStore
     """The object that each box shows, for boxes that are tested."""
+    odometry_end: Floats
+    """Where odometry alone leads, shape (d,)."""
     timestamps: list[float] = field(default_factory=list)
     given_ids: list[Ints] = field(default_factory=list)
     """Given ids of the boxes of each step, -1 for none."""

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dqslam import _core
 from dqslam._checks import Floats
+from dqslam._files import uninterrupted
+from dqslam._ids import ObjectId, ObjectRow
 from dqslam.association.noise import translation_axes
 from dqslam.online.identify import Identifier
 from dqslam.online.inputs import (
+    CheckedBoxes,
     box_noise_rows,
     check_boxes,
     measurement_tables,
@@ -22,57 +27,145 @@ from dqslam.online.step import Motion, StepBoxes, StepError, StepMeasurements, S
 from dqslam.recording import tangent_size
 
 
-def take_step(
+@dataclass(frozen=True, eq=False)
+class CheckedStep:
+    """A step that a session takes: nothing in it is refused any more, now or later."""
+
+    time: float
+    relative: Floats
+    covariance: Floats
+    boxes: CheckedBoxes
+    positions: StepPositions | None
+    measurements: Sequence[StepMeasurements]
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """What the core is given, and the ids that it does not know."""
+
+    observations: _core.StepObservations
+    ids: list[ObjectId]
+    """Ids that are believed, of the boxes that have one."""
+    names: list[str]
+    """Their classes."""
+    new: list[ObjectId]
+    """Ids of new objects, in their order."""
+    rows: list[ObjectRow]
+    """Rows of the objects of ``ids``."""
+    object_rows: NDArray[np.int32]
+    """Row of each box, -1 for one that waits."""
+
+
+def check_step(
     state: State,
-    identifier: Identifier,
     odometry: Motion | None,
     boxes: StepBoxes | None,
     timestamp: float | None,
     positions: StepPositions | None,
     measurements: Sequence[StepMeasurements],
-) -> _core.StepReport:
-    """Add a step to a session; see ``OnlineSlam.add``."""
-    settings, registry = state.settings, state.registry
-    count = len(state.timestamps)
+    *,
+    dry_run: bool,
+) -> tuple[CheckedStep, Prepared | None]:
+    """Check a step against a session, which does not change.
+
+    Returns the step and, unless something else changes before it is taken, what the core is given.
+
+    Parameters
+    ----------
+    dry_run
+        Whether a copy of the core takes the step, too: its refusal, which the other checks should
+        have foreseen, would come too late once something else has changed.
+
+    Raises
+    ------
+    StepError
+        If the step is wrong.
+    """
+    settings, count = state.settings, len(state.timestamps)
     try:
-        time = next_time(state.timestamps[-1] if count else None, timestamp)
-        checked = check_boxes(boxes)
-        begin = None if count else state.begin
-        relative, covariance = motion_arrays(odometry, begin, _step_covariance(state))
-        believed = checked.object_id.tolist() if settings.believes_ids else []
-        known = [place for place, one in enumerate(believed) if one >= 0]
-        ids = [believed[place] for place in known]
-        names = [checked.class_name[place] for place in known]
-        rows, new = registry.rows_of(ids)
-        priors = [state.prior.of(names[place]) for place in new]
-        object_rows = np.full(len(checked.box), -1, dtype=np.int32)
-        object_rows[known] = rows
-        observations = _core.StepObservations(
-            object=object_rows,
-            box=checked.box,
-            covariance=box_noise_rows(settings.box_noise, checked.box, settings.camera),
-            truncated=checked.truncated,
-            measurements=measurement_tables(positions, measurements, registry),
-            log_size_mean=np.array([prior.log_mean for prior in priors]),
-            log_size_sigma=np.array([prior.log_sigma for prior in priors]),
+        estimated = state.core.pose_at(count - 1) if count else state.begin[0]
+        relative, covariance = motion_arrays(
+            odometry,
+            None if count else state.begin,
+            _step_covariance(state),
+            settings.pose_model,
+            np.stack([estimated, state.odometry_end]),
         )
-        report = state.core.add(relative, covariance, observations)
+        step = CheckedStep(
+            time=next_time(state.timestamps[-1] if count else None, timestamp),
+            relative=relative,
+            covariance=covariance,
+            boxes=check_boxes(boxes, settings.camera),
+            positions=positions,
+            measurements=measurements,
+        )
+        prepared = _prepare(state, step)
+        if dry_run:
+            state.core.clone().add(relative, covariance, prepared.observations)
+    except (ValueError, TypeError, AttributeError, OverflowError) as error:
+        raise StepError(f"step {count}: {error}") from None
+    return step, None if dry_run else prepared
+
+
+def take_step(
+    state: State, identifier: Identifier, step: CheckedStep, prepared: Prepared | None
+) -> _core.StepReport:
+    """Add a step to a session, as a whole: Ctrl-C waits. See ``OnlineSlam.add``."""
+    with uninterrupted():
+        return _take_step(state, identifier, step, prepared)
+
+
+def _take_step(
+    state: State, identifier: Identifier, step: CheckedStep, prepared: Prepared | None
+) -> _core.StepReport:
+    registry, count = state.registry, len(state.timestamps)
+    try:
+        prepared = prepared or _prepare(state, step)
+        report = state.core.add(step.relative, step.covariance, prepared.observations)
     except (ValueError, TypeError) as error:
         raise StepError(f"step {count}: {error}") from None
-    registry.register(ids[place] for place in new)
-    for row, name in zip(rows, names, strict=True):
+    registry.register(prepared.new)
+    for row, name in zip(prepared.rows, prepared.names, strict=True):
         registry.votes[row][name] += 1
-    state.timestamps.append(time)
-    state.given_ids.append(checked.object_id)
-    state.shown = checked.object_id
+    state.timestamps.append(step.time)
+    state.given_ids.append(step.boxes.object_id)
+    state.shown = step.boxes.object_id
     if count:
-        identifier.integrate(relative, covariance)
-    if len(known) < len(object_rows):
-        waiting = np.flatnonzero(object_rows < 0)
+        model, end = state.settings.pose_model, state.odometry_end[None]
+        state.odometry_end = _core.compose(model, end, step.relative[None])[0]
+        identifier.integrate(step.relative, step.covariance)
+    object_rows = prepared.object_rows
+    waiting = np.flatnonzero(object_rows < 0)
+    if waiting.size:
         observation_rows = report.first_observation + waiting
-        object_rows[waiting] = identifier.identify(checked, waiting, observation_rows)
+        # What overflows after a jump over the globe is not determined, and compares as false.
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            found = identifier.identify(step.boxes, waiting, observation_rows)
+        object_rows[waiting] = found
         state.shown = np.array([*registry.ids, -1], dtype=np.int64)[object_rows]
     return report
+
+
+def _prepare(state: State, step: CheckedStep) -> Prepared:
+    settings, registry, boxes = state.settings, state.registry, step.boxes
+    believed = boxes.object_id.tolist() if settings.believes_ids else []
+    known = [place for place, one in enumerate(believed) if one >= 0]
+    ids = [believed[place] for place in known]
+    names = [boxes.class_name[place] for place in known]
+    rows, new = registry.rows_of(ids)
+    priors = [state.prior.of(names[place]) for place in new]
+    object_rows = np.full(len(boxes.box), -1, dtype=np.int32)
+    object_rows[known] = rows
+    observations = _core.StepObservations(
+        object=object_rows,
+        box=boxes.box,
+        covariance=box_noise_rows(settings.box_noise, boxes.box, settings.camera),
+        truncated=boxes.truncated,
+        measurements=measurement_tables(step.positions, step.measurements, registry),
+        log_size_mean=np.array([prior.log_mean for prior in priors]),
+        log_size_sigma=np.array([prior.log_sigma for prior in priors]),
+    )
+    return Prepared(observations, ids, names, [ids[place] for place in new], rows, object_rows)
 
 
 def _step_covariance(state: State) -> Floats | None:

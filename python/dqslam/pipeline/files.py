@@ -9,14 +9,18 @@ from pathlib import Path
 from typing import Any
 
 from dqslam import _core, io
-from dqslam._files import results_directory, uninterrupted, write_text
+from dqslam._files import write_text
+from dqslam._outputs import output_set
 from dqslam.association import FINAL
 from dqslam.inspection import FATAL, first_findings
+from dqslam.io.results.save import write_estimate
 from dqslam.pipeline.conclude import RunResult
 from dqslam.pipeline.options import Progress, RunFilesOptions
 from dqslam.pipeline.recording import run
 from dqslam.recording import Recording
 from dqslam.simulation import perturb_odometry
+
+WRITTEN_BY = "dqslam run"
 
 
 def run_files(
@@ -49,7 +53,9 @@ def run_files(
         to it, if any was.
     out
         Directory to write the results into: trajectory.txt, odometry.txt, map.json, boxes.csv,
-        covariance.csv, camera.json, report.json. Made if need be; by default nothing is written.
+        covariance.csv, camera.json, report.json, and manifest.json with their SHA-256. It must be
+        new, empty, or of an earlier run, whose files all go at once when the new ones are there;
+        by default nothing is written.
     beside
         Texts to write with them, by the names of their files.
 
@@ -57,8 +63,9 @@ def run_files(
     ------
     ValueError
         For files that do not fit together, unless forced; for what ``run`` refuses; and for what is
-        wrong in a file: ``io.FileError`` names the file and the line. No directory is left then
-        that was made for the results.
+        wrong in a file: ``io.FileError`` names the file and the line, or the directory that has
+        files of others. Results that were there stay then, and no directory is left that was made
+        for new ones.
 
     Examples
     --------
@@ -73,6 +80,34 @@ def run_files(
     """
     options = options or RunFilesOptions()
     _check_extras(options)
+    inputs = (
+        *(camera, odometry, detections, groundtruth, options.odometry_covariance),
+        *vars(options.extras).values(),
+    )
+    whole = nullcontext() if out is None else output_set(out, WRITTEN_BY, inputs=inputs)
+    with whole as folder:
+        result = _run(
+            (camera, odometry, detections),
+            options,
+            online=online,
+            groundtruth=groundtruth,
+            progress=progress,
+        )
+        if folder is not None:
+            _save(result, folder, beside or {})
+    return result
+
+
+def _run(
+    files: Sequence[str | Path],
+    options: RunFilesOptions,
+    *,
+    online: bool,
+    groundtruth: str | Path | None,
+    progress: Progress,
+) -> RunResult:
+    """Estimate a recording in files, and describe where everything came from."""
+    camera, odometry, detections = files
     if options.frames is None:
         times = io.choose_frame_times(odometry, detections, options.formats)
         options = replace(options, frames=times)
@@ -86,35 +121,31 @@ def run_files(
         )
         reference_name = "odometry before the added noise"
     says_noise = bool(options.believed_noise or options.odometry_covariance)
-    with nullcontext() if out is None else results_directory(Path(out)):
-        notes = io.Notes(max_bad=options.reading.max_bad)
-        doubts: list[str] = []
-        remarks: list[str] = []
-        recording, dropped = _load((camera, odometry, detections), options, notes, doubts, remarks)
-        result = run(
-            recording,
-            replace(options, estimates_noise=options.estimates_noise or not says_noise),
-            online=online,
-            reference=reference,
-            progress=progress,
-        )
-        report = {
-            "camera": str(camera),
-            "odometry": str(odometry),
-            "detections": str(detections),
-            "groundtruth": None if groundtruth is None else str(groundtruth),
-            **_describe(options),
-            "dropped_boxes": asdict(dropped),
-            "input_notes": notes.described(),
-            "reference": reference_name,
-            **result.report,
-        }
-        report["warnings"] = notes.sentences() + doubts + remarks + report["warnings"]
-        report["doubts"] = doubts + report["doubts"]
-        result = replace(result, report=report)
-        if out is not None:
-            _save(result, Path(out), beside or {})
-    return result
+    notes = io.Notes(max_bad=options.reading.max_bad)
+    doubts: list[str] = []
+    remarks: list[str] = []
+    recording, dropped = _load(files, options, notes, doubts, remarks)
+    result = run(
+        recording,
+        replace(options, estimates_noise=options.estimates_noise or not says_noise),
+        online=online,
+        reference=reference,
+        progress=progress,
+    )
+    report = {
+        "camera": str(camera),
+        "odometry": str(odometry),
+        "detections": str(detections),
+        "groundtruth": None if groundtruth is None else str(groundtruth),
+        **_describe(options),
+        "dropped_boxes": asdict(dropped),
+        "input_notes": notes.described(),
+        "reference": reference_name,
+        **result.report,
+    }
+    report["warnings"] = notes.sentences() + doubts + remarks + report["warnings"]
+    report["doubts"] = doubts + report["doubts"]
+    return replace(result, report=report)
 
 
 def _check_extras(options: RunFilesOptions) -> None:
@@ -208,16 +239,9 @@ def _describe(options: RunFilesOptions) -> dict[str, Any]:
     }
 
 
-def _save(result: RunResult, out: Path, beside: Mapping[str, str]) -> None:
-    """Write all files of a result, even if Ctrl-C comes meanwhile."""
-    with uninterrupted():
-        io.save_estimate(
-            result.estimate,
-            out,
-            detections=result.detections,
-            held_out=result.held_out,
-            marginals=result.marginals,
-        )
-        io.write_json(out / "report.json", result.report)
-        for name, text in beside.items():
-            write_text(out / name, text)
+def _save(result: RunResult, folder: Path, beside: Mapping[str, str]) -> None:
+    """Write all files of a result into an empty folder."""
+    write_estimate(result.estimate, folder, result.detections, result.held_out, result.marginals)
+    io.write_json(folder / "report.json", result.report)
+    for name, text in beside.items():
+        write_text(folder / name, text)

@@ -15,6 +15,7 @@ from dqslam.plot.style import (
     class_styles,
     column_style,
     new_figure,
+    shown_name,
 )
 
 if TYPE_CHECKING:
@@ -96,7 +97,7 @@ def _name(
     place_labels(
         axes,
         [rectangle(fits.boxes.box[row]) for row in rows],
-        [f"{objects.class_names[row]} {objects.object_ids[row]}" for row in seen],
+        [f"{shown_name(objects.class_names[row])} {objects.object_ids[row]}" for row in seen],
         [styles[objects.class_names[row]]["color"] for row in seen],
         size=5.5,
     )

@@ -62,6 +62,7 @@ def place_labels(
             bbox={"pad": 0.5, "facecolor": "none", "linewidth": 0.0},  # the end of the line
             arrowprops=line if distance >= _LEADER_FROM else None,
             zorder=6,
+            parse_math=False,
             path_effects=[withStroke(linewidth=1.2, foreground="white")],
         )
         written += 1
@@ -70,7 +71,7 @@ def place_labels(
 
 def _text_size(axes: "Axes", text: str, size: float) -> Floats:
     """Return width and height of a text in pixels."""
-    written = axes.text(0, 0, text, fontsize=size)
+    written = axes.text(0, 0, text, fontsize=size, parse_math=False)
     bounds = written.get_window_extent()
     written.remove()
     return np.array([bounds.width, bounds.height])

@@ -13,7 +13,7 @@ from dqslam.evaluation import fit_boxes
 from dqslam.io import Results
 from dqslam.metrics import visible_outlines
 from dqslam.plot.frame import draw_boxes
-from dqslam.plot.style import class_styles, column_style, new_figure, save_figure
+from dqslam.plot.style import class_styles, column_style, new_figure, save_figure, shown_name
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -104,7 +104,10 @@ class Overlay:
         )
         if is_detected:
             self._write_name(
-                axes, f"{objects.class_names[row]} {objects.object_ids[row]}", outline, color
+                axes,
+                f"{shown_name(objects.class_names[row])} {objects.object_ids[row]}",
+                outline,
+                color,
             )
 
     def _write_name(self, axes: "Axes", name: str, outline: Floats, color: str) -> None:
@@ -116,6 +119,7 @@ class Overlay:
             float(np.clip((low[0] + high[0]) / 2.0, half, max(camera.width - half, half))),
             float(np.clip(low[1] - 2.0, 2.0 * size, camera.height - 4.0)),
             name,
+            parse_math=False,
             color="white",
             fontsize=size,
             ha="center",

@@ -21,6 +21,7 @@ from dqslam.plot.style import (
     class_styles,
     column_style,
     new_figure,
+    shown_name,
 )
 
 if TYPE_CHECKING:
@@ -233,7 +234,7 @@ def _draw_legend(
             facecolor=(str(style["color"]), 0.25),
             edgecolor=str(style["color"]),
             linestyle=style["linestyle"],
-            label=name,
+            label=shown_name(name),
         )
         for name, style in styles.items()
     ]
@@ -255,4 +256,7 @@ def _names(objects: MapObjects) -> list[str]:
         return [str(number) for number in objects.object_ids]
     count = Counter(objects.class_names)
     pairs = zip(objects.class_names, objects.object_ids, strict=True)
-    return [name if count[name] == 1 else f"{name} {number}" for name, number in pairs]
+    return [
+        shown_name(name) if count[name] == 1 else f"{shown_name(name)} {number}"
+        for name, number in pairs
+    ]

@@ -1,6 +1,7 @@
 """The style of all figures: sizes, files, and colors that color-blind readers can distinguish."""
 
 import contextlib
+import warnings
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
@@ -18,6 +19,7 @@ from dqslam._colors import TRUTH as TRUTH
 from dqslam._colors import VERMILLION as VERMILLION
 from dqslam._colors import YELLOW as YELLOW
 from dqslam._files import FileError, whole_file
+from dqslam._repr import printable
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -44,6 +46,7 @@ _RC = {
     "ytick.major.width": 0.6,
     "lines.linewidth": 1.0,
     "pdf.fonttype": 42,  # keeps text as text
+    "text.parse_math": False,  # names of classes are no formulas
     "svg.hashsalt": "dqslam",  # makes files reproducible
 }
 _NO_DATE = {"svg": {"Date": None}, "pdf": {"CreationDate": None}, "png": None}
@@ -54,7 +57,9 @@ def column_style() -> Iterator[None]:
     """Use the sizes for a column of text, for drawing and for saving figures."""
     from matplotlib import rc_context
 
-    with rc_context(_RC):  # type: ignore[arg-type]
+    with rc_context(_RC), warnings.catch_warnings():  # type: ignore[arg-type]
+        # A name in letters that the font lacks is drawn as boxes; all else is as it should be.
+        warnings.filterwarnings("ignore", message="Glyph .* missing from font")
         yield
 
 
@@ -81,6 +86,12 @@ def class_styles(class_names: Iterable[str]) -> dict[str, dict[str, Any]]:
             "linestyle": _CLASS_LINES[turn % len(_CLASS_LINES)],
         }
     return styles
+
+
+def shown_name(name: str) -> str:
+    """Return the name of a class as a label: Matplotlib leaves out those that begin with "_"."""
+    shown = printable(name)
+    return f" {shown}" if shown.startswith("_") else shown
 
 
 def legend_above(figure: "Figure", handles: "Sequence[Artist]") -> None:

@@ -7,8 +7,18 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dqslam._checks import Bools, Floats, Ints, as_floats, as_ints, assign, reject_rows
+from dqslam._checks import (
+    Bools,
+    Floats,
+    Ints,
+    as_floats,
+    as_ints,
+    assign,
+    reject_large,
+    reject_rows,
+)
 from dqslam._core import Camera
+from dqslam._limits import LARGEST_ID, LARGEST_PIXEL
 from dqslam._repr import counted
 from dqslam.lens import undistort_boxes
 from dqslam.recording.detectors import DetectedBoxes, read_supervision, read_ultralytics
@@ -39,13 +49,15 @@ class Detections:
     def __post_init__(self) -> None:
         """Check shapes and numbers."""
         box = as_floats("detections.box", self.box, [None, 4])
+        reject_large("detections.box", box, LARGEST_PIXEL, "px")
         reject_rows("detections.box", box[:, :2] >= box[:, 2:], "inverted or empty box", box)
         count = len(box)
         class_id = as_ints("detections.class_id", self.class_id, count)
         unnamed = ~np.isin(class_id, list(self.class_names))
         reject_rows("detections.class_id", unnamed, "class has no name", class_id)
         object_id = as_ints("detections.object_id", self.object_id, count)
-        reject_rows("detections.object_id", object_id < -1, "not an object id", object_id)
+        wrong = (object_id < -1) | (object_id > LARGEST_ID)
+        reject_rows("detections.object_id", wrong, "not an object id", object_id)
         assign(
             self,
             pose=as_ints("detections.pose", self.pose, count),

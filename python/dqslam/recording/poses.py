@@ -3,8 +3,9 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dqslam._checks import Floats, as_floats, reject_rows
+from dqslam._checks import Floats, as_floats, reject_large, reject_rows
 from dqslam._core import PoseModel
+from dqslam._limits import LARGEST_ANGLE_RAD, LARGEST_COORDINATE_M
 
 _SIZES = {PoseModel.SE2: 3, PoseModel.SE3: 7}
 # Digits that were rounded away cost up to 1e-3 of a quaternion's length; more is a mistake.
@@ -34,7 +35,10 @@ def pose_model_of(name: str, poses: ArrayLike) -> PoseModel:
 def as_poses(name: str, values: ArrayLike, pose_model: PoseModel) -> Floats:
     """Return read-only poses, shape (n, d), finite; rounded quaternions become of unit length."""
     poses = as_floats(name, values, [None, pose_size(pose_model)])
+    places = 2 if pose_model == PoseModel.SE2 else 3
+    reject_large(name, poses[:, :places], LARGEST_COORDINATE_M, "m")
     if pose_model == PoseModel.SE2:
+        reject_large(name, poses[:, 2:], LARGEST_ANGLE_RAD, "rad")
         return poses
     norms = np.linalg.norm(poses[:, 3:], axis=1, keepdims=True)
     off = np.abs(norms - 1.0)

@@ -5,7 +5,17 @@ from typing import Self
 
 import numpy as np
 
-from dqslam._checks import Bools, Floats, Ints, as_covariances, as_floats, as_ints, assign
+from dqslam._checks import (
+    Bools,
+    Floats,
+    Ints,
+    as_covariances,
+    as_floats,
+    as_ints,
+    assign,
+    reject_large,
+)
+from dqslam._limits import LARGEST_COORDINATE_M
 from dqslam._repr import counted
 
 
@@ -25,6 +35,7 @@ class RelativePositions:
     def __post_init__(self) -> None:
         """Check shapes and numbers."""
         object_in_robot = as_floats("positions.object_in_robot", self.object_in_robot, [None, 3])
+        reject_large("positions.object_in_robot", object_in_robot, LARGEST_COORDINATE_M, "m")
         count = len(object_in_robot)
         assign(
             self,

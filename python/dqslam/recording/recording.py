@@ -4,8 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dqslam._checks import Floats, as_floats, assign, reject_rows
+from dqslam._checks import Floats, as_floats, assign, reject_large, reject_rows
 from dqslam._core import Camera
+from dqslam._limits import LARGEST_TIME_S
 from dqslam._repr import counted
 from dqslam.recording.closures import AbsolutePositions, LoopClosures, check_rows
 from dqslam.recording.detections import Detections, in_words
@@ -49,6 +50,7 @@ class Recording:
     def __post_init__(self) -> None:
         """Check that the parts fit together."""
         timestamps = as_floats("timestamps", self.timestamps, [None])
+        reject_large("timestamps", timestamps, LARGEST_TIME_S, "s")
         stalls = np.concatenate([[False], np.diff(timestamps) <= 0.0])[: len(timestamps)]
         reject_rows("timestamps", stalls, "time does not increase", timestamps)
         count = len(self.odometry.relative) + 1

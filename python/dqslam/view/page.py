@@ -16,24 +16,37 @@ import numpy as np
 
 from dqslam._checks import Floats
 from dqslam._colors import ESTIMATE, ODOMETRY, TRUTH
+from dqslam._outputs import output_set
 from dqslam.io.files import write_text
 from dqslam.view.scene import Scene, SceneObject, Spread
 
 _STATIC = Path(__file__).with_name("static")
+WRITTEN_BY = "dqslam view"
 # Micrometers and microradians are enough; more digits would only make the file larger.
 _DECIMALS = 6
 
 
 def write_page(scene: Scene, directory: str | Path) -> Path:
-    """Write the page into a directory, created if needed, and return its ``index.html``."""
+    """Write the page into a folder, created if needed, and return its ``index.html``.
+
+    Raises
+    ------
+    FileError
+        If the folder has files that are not of an earlier page.
+    """
     directory = Path(directory)
-    directory.mkdir(parents=True, exist_ok=True)
+    with output_set(directory, WRITTEN_BY) as folder:
+        write_page_files(scene, folder)
+    return directory / "index.html"
+
+
+def write_page_files(scene: Scene, folder: Path) -> None:
+    """Write the page into a folder that has none."""
     for source in sorted(_STATIC.iterdir()):
-        shutil.copyfile(source, directory / source.name)
+        shutil.copyfile(source, folder / source.name)
     # A script, not JSON, because a browser that opens the folder itself may not fetch files.
     text = json.dumps(_describe(scene), separators=(",", ":"), allow_nan=False)
-    write_text(directory / "scene.js", f"const scene = {text};\n")
-    return directory / "index.html"
+    write_text(folder / "scene.js", f"const scene = {text};\n")
 
 
 def _describe(scene: Scene) -> dict[str, Any]:

@@ -7,6 +7,7 @@ from html import escape
 import numpy as np
 
 from dqslam._checks import Floats, Ints
+from dqslam._repr import printable
 from dqslam.metrics import visible_outlines
 from dqslam.view.scene import Scene
 
@@ -65,5 +66,5 @@ def _box(scene: Scene, row: int, selected: int | None, line: float) -> str:
         f'height="{bottom - top:.1f}" fill="none" stroke="{color}" '
         f'stroke-width="{thickness * line:.2f}" stroke-dasharray="{dashes}"/>'
         f'<text x="{left:.1f}" y="{max(top - 3.0 * line, 10.0 * line):.1f}">'
-        f"{escape(boxes.class_name[row])}</text>"
+        f"{escape(printable(boxes.class_name[row]))}</text>"
     )

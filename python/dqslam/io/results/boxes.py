@@ -102,7 +102,7 @@ def write_boxes(
                 " ".join(cut),
                 f"{detections.score[row]:g}",
                 class_id,
-                detections.class_names[class_id],
+                " ".join(detections.class_names[class_id].splitlines()),  # rows are lines
                 int(detections.object_id[row]),
                 int(inlier[row]),
                 int(held_out[row]),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -12,12 +13,26 @@ import numpy as np
 
 from dqslam import _core
 from dqslam._checks import Bools, Floats, Ints, as_floats, as_ints
+from dqslam._exchange import standing
+from dqslam._manifest import check_files, complete_manifest, read_manifest
 from dqslam._repr import counted
 from dqslam.io.camera import read_camera
 from dqslam.io.files import FileError, read_text
 from dqslam.io.results.boxes import BoxTable, read_boxes
 from dqslam.io.results.covariances import read_covariances
-from dqslam.io.trajectory import read_trajectory
+from dqslam.io.results.save import NO_POSES
+from dqslam.io.trajectory import Trajectory, read_trajectory
+
+RESULT_FILES = (
+    "trajectory.txt",
+    "odometry.txt",
+    "camera.json",
+    "map.json",
+    "covariance.csv",
+    "boxes.csv",
+    "report.json",
+)
+_MOST_READINGS = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,12 +117,15 @@ class Results:
 def load_results(directory: str | Path) -> Results:
     """Read a directory of results.
 
-    ``covariance.csv``, ``boxes.csv`` and ``report.json`` may be absent.
+    ``covariance.csv``, ``boxes.csv`` and ``report.json`` may be absent. If there is a
+    ``manifest.json``, the files are compared with it: for each that has been changed, added or
+    taken away since they were written, there is a ``ChangedFileWarning``.
 
     Raises
     ------
     FileError
-        If a file is missing or wrong; the error names it, and its line if it has lines.
+        If a file is missing or wrong; the error names it, and its line if it has lines. Or if the
+        manifest says that the writing of the files was interrupted.
 
     Examples
     --------
@@ -121,11 +139,35 @@ def load_results(directory: str | Path) -> Results:
     >>> results.poses.shape, results.objects.centers.shape
     ((253, 7), (10, 3))
     """
+    found = load_map_results(directory)
+    if not len(found.timestamps):
+        raise FileError(found.directory / "trajectory.txt", "holds no pose: it is a map alone")
+    return found
+
+
+def load_map_results(directory: str | Path) -> Results:
+    """Read a directory of results as ``load_results`` does, or that of a session without steps."""
     directory = Path(directory)
-    if not directory.is_dir():
-        raise FileError(directory, "no such directory")
-    times, poses = read_trajectory(directory / "trajectory.txt")
-    odometry_times, odometry = read_trajectory(directory / "odometry.txt")
+    for _ in range(_MOST_READINGS):
+        folder = standing(directory)
+        if not folder.is_dir():
+            raise FileError(directory, "no such directory")
+        before = complete_manifest(folder)
+        try:
+            found: Results | FileError = _read_results(folder)
+        except FileError as error:
+            found = error
+        if read_manifest(standing(directory)) == before:
+            break  # else another process has written new results meanwhile
+    if isinstance(found, FileError):
+        raise found
+    check_files(folder, RESULT_FILES)
+    return found
+
+
+def _read_results(directory: Path) -> Results:
+    times, poses = _read_path(directory / "trajectory.txt")
+    odometry_times, odometry = _read_path(directory / "odometry.txt")
     if not np.array_equal(times, odometry_times):
         message = f"its times are not those of {directory / 'trajectory.txt'}"
         raise FileError(directory / "odometry.txt", message)
@@ -144,6 +186,14 @@ def load_results(directory: str | Path) -> Results:
         boxes=read_boxes(boxes, times) if boxes.exists() else None,
         report=_read_json(report) if report.exists() else {},
     )
+
+
+def _read_path(path: Path) -> Trajectory:
+    """Read a path; that of a session without steps is a comment that says so."""
+    with contextlib.suppress(OSError, UnicodeDecodeError):
+        if path.read_text(encoding="utf-8") == NO_POSES:
+            return Trajectory(np.zeros(0), np.zeros((0, 7)))
+    return read_trajectory(path)
 
 
 def _read_json(path: Path) -> dict[str, Any]:

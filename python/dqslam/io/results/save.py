@@ -9,13 +9,17 @@ import numpy as np
 
 from dqslam import _core
 from dqslam._checks import Bools, Floats, require
+from dqslam._outputs import output_set
 from dqslam.estimate import Estimate
 from dqslam.io.camera.table import write_json_camera
-from dqslam.io.files import write_json
+from dqslam.io.files import write_json, write_text
 from dqslam.io.results.boxes import write_boxes
 from dqslam.io.results.covariances import write_covariances
 from dqslam.io.trajectory import write_trajectory
 from dqslam.recording import Detections
+
+NO_POSES = "# no poses\n"
+"""The content of ``trajectory.txt`` and ``odometry.txt`` of an estimate without poses."""
 
 
 class Covariances(Protocol):
@@ -42,7 +46,9 @@ def save_estimate(
 
     ``trajectory.txt`` has the estimated poses and ``odometry.txt`` the initial poses, both
     world_from_camera. ``map.json`` has the objects, and the reasons why others were dropped.
-    ``camera.json`` has the camera. Each file is complete or absent.
+    ``camera.json`` has the camera. ``manifest.json`` has the SHA-256 of each file. The files of an
+    earlier call go at once when those of this one are there. If the directory has files of others,
+    they stay, and the files are exchanged one by one.
 
     Parameters
     ----------
@@ -59,8 +65,9 @@ def save_estimate(
     ------
     ValueError
         If detections or marginals do not fit the estimate.
-    OSError
-        If a file cannot be written.
+    FileError
+        If the directory has the results of a command, or files of these names that are others' or
+        have been changed since an earlier call, or if a file cannot be written.
 
     Examples
     --------
@@ -74,23 +81,33 @@ def save_estimate(
     Results('results/seed7', 253 poses, 10 objects)
     """
     require(estimate, Estimate, "save_estimate", "save_estimate(estimate, directory)")
-    directory = Path(directory)
+    with output_set(directory, "save_estimate", beside_others=True) as folder:
+        write_estimate(estimate, folder, detections, held_out, marginals)
+
+
+def write_estimate(
+    estimate: Estimate,
+    directory: Path,
+    detections: Detections | None = None,
+    held_out: Bools | None = None,
+    marginals: Covariances | None = None,
+) -> None:
+    """Write the files of an estimate into a folder that has none of them; see `save_estimate`."""
     paths = {"trajectory.txt": estimate.poses, "odometry.txt": estimate.initial_poses}
     for name, poses in paths.items():
         cameras = _core.world_from_camera(estimate.pose_model, estimate.camera, poses)
-        write_trajectory(directory / name, estimate.timestamps, cameras)
+        if len(poses):
+            write_trajectory(directory / name, estimate.timestamps, cameras)
+        else:
+            write_text(directory / name, NO_POSES)
     write_json_camera(directory / "camera.json", estimate.camera)
     objects = [_object(estimate, row, marginals) for row in range(len(estimate.object_ids))]
     dropped = [{"id": number, "reason": reason} for number, reason in estimate.dropped.items()]
     write_json(directory / "map.json", {"objects": objects, "dropped": dropped})
     if detections is not None:
         write_boxes(directory / "boxes.csv", estimate, detections, held_out)
-    else:
-        (directory / "boxes.csv").unlink(missing_ok=True)  # it may be from an earlier estimate
     if marginals is not None:
         write_covariances(directory / "covariance.csv", estimate, marginals.poses)
-    else:
-        (directory / "covariance.csv").unlink(missing_ok=True)
 
 
 def _object(estimate: Estimate, row: int, marginals: Covariances | None) -> dict[str, Any]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+from dqslam._outputs import added_files, check_added, claim_folder
 from dqslam._version import version
 from dqslam.studies.pool import Backend, run_each
 from dqslam.studies.sweep.file import Sweep
@@ -15,6 +16,9 @@ from dqslam.studies.sweep.table import write_results
 from dqslam.studies.sweep.trial import Task, TrialResult, cell_key, run_task, trial_key
 
 Progress = Callable[[int, int], None]
+WRITTEN_BY = "dqslam sweep"
+SUMMARY = "summary.json"
+TABLES = ("results.csv", "results.parquet", SUMMARY)
 
 
 @dataclass(frozen=True)
@@ -59,10 +63,13 @@ def run_sweep(
     Raises
     ------
     FileError
-        If the folder cannot be written, or has trials of another version of dqslam.
+        If the folder cannot be written, has files of others, or trials of another version of
+        dqslam.
     RuntimeError
         If a worker has another version of dqslam, or a trial ends the process that runs it.
     """
+    claim_folder(folder, WRITTEN_BY)
+    check_added(folder, TABLES, WRITTEN_BY)
     store = Store(folder)
     cells = [cell_key(cell.settings) for cell in sweep.cells]
     tasks = {
@@ -84,15 +91,16 @@ def run_sweep(
             if progress is not None:
                 progress(len(results), len(tasks))
     ordered = [[results[trial_key(name, seed)] for seed in sweep.seeds] for name in cells]
-    files = write_results(store.folder, sweep, cells, ordered)
     summary = summarize(sweep, cells, ordered)
-    summary.save(store.folder / "summary.json")
+    with added_files(folder, TABLES, WRITTEN_BY) as stage:
+        files = [*write_results(stage, sweep, cells, ordered), stage / SUMMARY]
+        summary.save(files[-1])
     return SweepRun(
         summary=summary,
         done=len(missing),
         found=found,
         failures={key: results[key].failure for key in tasks if results[key].failure},
-        files=(*files, store.folder / "summary.json"),
+        files=tuple(store.folder / file.name for file in files),
     )
 
 

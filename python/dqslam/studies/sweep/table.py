@@ -8,7 +8,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from dqslam._files import write_text
+from dqslam._files import whole_file, write_text
 from dqslam.studies.sweep.file import Sweep
 from dqslam.studies.sweep.trial import METRICS, TrialResult
 
@@ -64,10 +64,6 @@ def _write_parquet(path: Path, columns: dict[str, list[Any]]) -> Path:
     import pyarrow
     from pyarrow import parquet
 
-    temporary = path.with_name(f".{path.name}.tmp")
-    try:
+    with whole_file(path) as temporary:
         parquet.write_table(pyarrow.table(columns), temporary)
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
     return path

@@ -1,0 +1,1 @@
+"""Mutation fuzzers over every reader, the binding and sessions; `./run fuzz` runs them."""

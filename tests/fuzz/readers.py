@@ -1,0 +1,138 @@
+"""Readers of every format of the registry, and of the other files: one clear error, or good data.
+
+A format that can be written joins by itself: its files are made from the corpus by `convert`.
+"""
+
+import random
+import shutil
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import dqslam as dq
+from dqslam import io
+from dqslam.io.convert import FORMATS, ConvertContext, convert
+from dqslam.simulation.scenario import load_scenario
+from fuzz.mutate import mutate_file
+
+CORPUS = Path(__file__).resolve().parents[1] / "corpus"
+SCENARIO = CORPUS.parents[1] / "data" / "scenarios" / "orbit.toml"
+SIZE = (640, 480)
+SOURCES = {"camera": "camera.json", "trajectory": "trajectory.txt", "detections": "boxes.csv"}
+
+
+class Wrong(AssertionError):
+    """A reader has let through what it must refuse, or refused it in the wrong way."""
+
+
+@dataclass(frozen=True)
+class Reader:
+    """A file or folder that is read, and how."""
+
+    name: str
+    path: Path
+    read: Callable[[Path], Any]
+
+
+def read_camera(path: Path, format_: str | None = None) -> None:
+    camera = io.read_camera(path, format_)
+    numbers = [camera.fx, camera.fy, camera.cx, camera.cy, *camera.distortion]
+    _require(np.isfinite(numbers).all() and camera.fx > 0 and camera.width > 0, "camera")
+
+
+def read_trajectory(path: Path, format_: str | None = None) -> None:
+    notes = io.Notes()
+    found = io.read_trajectory(path, format_, frames=io.frame_rate(10.0), notes=notes)
+    _check_notes(notes)
+    poses = found.world_from_camera
+    _require(np.isfinite(poses).all() and poses.shape == (len(found.timestamps), 7), "poses")
+    _require(np.isfinite(found.timestamps).all(), "times")
+    _require((np.diff(found.timestamps) > 0.0).all(), "order of times")
+    _require(np.allclose(np.linalg.norm(poses[:, 3:], axis=1), 1.0, atol=1e-6), "quaternions")
+
+
+def read_detections(path: Path, format_: str | None = None) -> None:
+    notes, frames = io.Notes(), io.frame_rate(10.0)
+    table = io.read_detections(
+        path, format_, width=SIZE[0], height=SIZE[1], frames=frames, notes=notes
+    )
+    _check_notes(notes)
+    box = table.box
+    _require(np.isfinite(box).all() and (box[:, :2] < box[:, 2:]).all(), "boxes")
+    _require(np.isfinite(table.timestamp).all() and np.isfinite(table.score).all(), "times")
+    _require(len(box) == len(table.class_id) == len(table.class_name), "classes")
+
+
+READ = {"camera": read_camera, "trajectory": read_trajectory, "detections": read_detections}
+
+
+def read_results(path: Path) -> None:
+    found = dq.load_results(path)
+    _require(np.isfinite(found.poses).all(), "poses")
+    _require(np.isfinite(found.objects.centers).all(), "centers")
+    _require(len(found.poses) == len(found.timestamps) == len(found.initial_poses), "lengths")
+
+
+def _check_notes(notes: io.Notes) -> None:
+    _require(not any("\n" in sentence for sentence in notes.sentences()), "notes of several lines")
+
+
+def _require(is_good: bool, what: str) -> None:
+    if not is_good:
+        raise Wrong(f"{what} that are wrong were read")
+
+
+def readers(folder: Path) -> Iterator[Reader]:
+    """Make a good file of every format in a folder, and yield its reader."""
+    source = {kind: CORPUS / name for kind, name in SOURCES.items()}
+    context = ConvertContext(size=SIZE, frames=io.frame_rate(10.0))
+    for kind, formats in FORMATS.items():
+        for format_ in formats:
+            if format_.write is None:
+                continue
+            ending = format_.endings[0] if format_.endings else ""
+            path = folder / f"{kind}-{format_.name}{ending}"
+            convert(source[kind], path, to=format_.name, context=context)
+            yield Reader(f"{kind}/{format_.name}", path, READ[kind])
+            named = partial(READ[kind], format_=format_.name)
+            yield Reader(f"{kind}/{format_.name}, named", path, named)
+    yield Reader("results", CORPUS / "results", read_results)
+    yield Reader("true objects", CORPUS / "objects.csv", io.read_true_objects)
+    yield Reader("scenario", SCENARIO, lambda path: load_scenario(str(path)))
+    times = np.loadtxt(CORPUS / "trajectory.txt")[:, 0]
+    covariances = CORPUS / "odometry_covariance.csv"
+    yield Reader(
+        "step covariances", covariances, lambda path: io.read_step_covariances(path, times)
+    )
+    for path in sorted(CORPUS.glob("found/*/*")):  # what was once read wrongly
+        yield Reader(f"found/{path.parent.name}", path, READ[path.parent.name])
+
+
+def try_reader(reader: Reader, seed: str, folder: Path) -> None:
+    """Read a mutated copy.
+
+    Raises
+    ------
+    Exception
+        Whatever is neither good data nor one error that names the file.
+    """
+    rng = random.Random(seed)
+    copied = folder / reader.path.name
+    if reader.path.is_dir():
+        shutil.copytree(reader.path, copied)
+    else:
+        shutil.copyfile(reader.path, copied)
+    try:
+        mutate_file(copied, rng)
+        reader.read(copied)
+    except ValueError as error:
+        if str(folder) not in str(error):
+            raise Wrong(f"the error does not name the file: {error}") from error
+        if "\n" in str(error) and not hasattr(error, "errors"):
+            raise Wrong(f"the error has several lines: {error!r}") from error
+    finally:
+        shutil.rmtree(copied) if copied.is_dir() else copied.unlink(missing_ok=True)
