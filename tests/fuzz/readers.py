@@ -16,6 +16,7 @@ import numpy as np
 import dqslam as dq
 from dqslam import io
 from dqslam.io.convert import FORMATS, ConvertContext, convert
+from dqslam.io.formats import guarded
 from dqslam.simulation.scenario import load_scenario
 from fuzz.mutate import mutate_file
 
@@ -23,6 +24,21 @@ CORPUS = Path(__file__).resolve().parents[1] / "corpus"
 SCENARIO = CORPUS.parents[1] / "data" / "scenarios" / "orbit.toml"
 SIZE = (640, 480)
 SOURCES = {"camera": "camera.json", "trajectory": "trajectory.txt", "detections": "boxes.csv"}
+MEASURED = {
+    "positions": (
+        io.read_positions,
+        "pose,object,x,y,z,sigma\n0,0,0.1,0.2,3.0,0.1\n4,1,-0.5,0.0,4.0,0.2\n",
+    ),
+    "absolute": (
+        io.read_absolute,
+        "pose,x,y,z,c11,c12,c13,c22,c23,c33\n0,1,2,3,0.04,0,0,0.04,0,0.09\n",
+    ),
+    "closures": (
+        io.read_closures,
+        "from_pose,to_pose,x,y,z,qx,qy,qz,qw,sigma_translation,sigma_rotation\n"
+        "0,9,0.1,0.0,-0.2,0.0,0.0,0.0,1.0,0.05,0.01\n",
+    ),
+}
 
 
 class Wrong(AssertionError):
@@ -77,6 +93,13 @@ def read_results(path: Path) -> None:
     _require(len(found.poses) == len(found.timestamps) == len(found.initial_poses), "lengths")
 
 
+def _read_measured(read: Callable[..., Any], times: Any, path: Path) -> None:
+    """Read measurements as a run does, which must be good for a recording."""
+    found = guarded(path, "CSV", read, path, times)
+    for name, values in vars(found).items():
+        _require(np.isfinite(values).all(), name)
+
+
 def _check_notes(notes: io.Notes) -> None:
     _require(not any("\n" in sentence for sentence in notes.sentences()), "notes of several lines")
 
@@ -108,6 +131,10 @@ def readers(folder: Path) -> Iterator[Reader]:
     yield Reader(
         "step covariances", covariances, lambda path: io.read_step_covariances(path, times)
     )
+    for name, (read, text) in MEASURED.items():
+        path = folder / f"{name}.csv"
+        path.write_text(text)
+        yield Reader(name, path, partial(_read_measured, read, times))
     for path in sorted(CORPUS.glob("found/*/*")):  # what was once read wrongly
         yield Reader(f"found/{path.parent.name}", path, READ[path.parent.name])
 

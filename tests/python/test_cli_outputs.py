@@ -2,6 +2,8 @@
 
 import os
 import shutil
+import subprocess
+import sys
 
 import pytest
 
@@ -26,6 +28,9 @@ def run_of(folder):
 @pytest.fixture
 def rec(made, tmp_path):
     return shutil.copytree(made, tmp_path / "rec")
+
+
+MEASURED = ("--positions", "--absolute", "--closures", "--frame-times", "--camera-in-body")
 
 
 def only_line(text):
@@ -56,6 +61,10 @@ def commands(rec, tmp_path):
         (["run", *run_of(rec), "--out", mine], mine),
         (["run", *run_of(results), "--out", results], results),
         (["run", *run_of(rec), "--out", mine / "notes.txt"], mine / "notes.txt"),
+        *[
+            (["run", *run_of(rec), option, results / "covariance.csv", "--out", results], results)
+            for option in MEASURED
+        ],
         (["simulate", "orbit", "--out", mine], mine),
         (["simulate", "orbit", "--out", rec], rec),  # its results are another command's
         (["simulate", "orbit", "--out", results], results),
@@ -81,6 +90,8 @@ def commands(rec, tmp_path):
             + [rec / "camera.json"],
             rec / "camera.json",
         ),
+        (["convert", results, results / "map.json", "--to", "g2o"], results / "map.json"),
+        (["convert", results, results, "--to", "colmap-model"], results),
         (["evaluate", rec, *truth], rec / "trajectory.txt"),
     ]
 
@@ -91,6 +102,26 @@ def test_every_command_refuses_before_the_work(rec, tmp_path, capsys):
         said = refused(capsys, *command)
         assert str(path) in said, command
         assert snapshot(tmp_path) == before, command
+
+
+@pytest.mark.parametrize("command", ["convert", "run"])
+def test_a_file_that_is_standard_input_is_not_written_over(rec, command):
+    results = rec / "results"
+    if command == "convert":
+        words, path = ["-", rec / "boxes.csv", "--format", "csv"], rec / "boxes.csv"
+        out = path
+    else:
+        path, out = results / "boxes.csv", results
+        words = [*run_of(rec)[:4], "--detections", "-", "--out", out]
+    before = snapshot(rec)
+    program = "import sys; from dqslam.cli import main; sys.exit(main())"
+    call = [sys.executable, "-c", program, command, *map(str, words)]
+    with path.open() as file:
+        result = subprocess.run(call, stdin=file, capture_output=True, text=True, timeout=60)
+    assert result.returncode == 2
+    assert only_line(result.stderr).startswith(f"dqslam: {out}: ")
+    assert "input" in result.stderr or "read by this run" in result.stderr
+    assert snapshot(rec) == before
 
 
 def test_evaluate_leaves_a_users_file(rec, tmp_path, capsys):

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from dqslam._input import refuse_shared_input
+from dqslam._outputs import check_output_set
 from dqslam.cli.options import (
     AbsoluteFile,
     BoxForm,
@@ -163,10 +164,14 @@ def run(
     from dqslam import _core, io
     from dqslam.assumptions import load_size_priors
     from dqslam.pipeline import RunFilesOptions, run_files
+    from dqslam.pipeline.files import WRITTEN_BY
 
-    inputs = (camera, odometry, detections, frame_times, camera_in_body)
-    measured = (odometry_covariance, positions, absolute, closures)
-    refuse_shared_input(*inputs, *measured, groundtruth, size_priors)
+    inputs = (
+        *(camera, odometry, detections, frame_times, camera_in_body, groundtruth, size_priors),
+        *(odometry_covariance, positions, absolute, closures),
+    )
+    refuse_shared_input(*inputs)
+    check_output_set(out, WRITTEN_BY, inputs=inputs)
     added = parse_noise("--perturb-odometry", perturb_odometry)
     believed = parse_noise("--odometry-noise", odometry_noise)
     if odometry_covariance is not None and (added or believed):

@@ -112,7 +112,7 @@ def convert(
     if out.exists() and source.exists() and out.samefile(source):
         raise ValueError(f"{out}: the file would be written over itself")
     for file in (out, _frames_file(out)):
-        refuse_inputs(file, [source, *context.files])
+        refuse_inputs(file, [*_files_of(source), *context.files])
     kind = _kind(source, format, to)
     if kind is not None:
         target = _target(out, to, kind)
@@ -145,7 +145,7 @@ def _convert_results(
     """Write results for another program."""
     if to is None and out.suffix.lower() == ".g2o":
         to = "g2o"
-    refuse_inputs(out, [*source.iterdir(), context.odometry_covariance, *context.files])
+    refuse_inputs(out, [*_files_of(source), context.odometry_covariance, *context.files])
     results = load_results(source)
     if to == "colmap-model":
         write_colmap_model(out, results)
@@ -159,6 +159,11 @@ def _convert_results(
     what = f"{len(graph.poses)} poses, {len(graph.landmarks)} landmarks"
     what += f" and {len(graph.landmark_edges)} edges to them as {to}"
     return [Written(out, what, ("times", "shapes of objects"))]
+
+
+def _files_of(source: Path) -> list[Path]:
+    """Return a source, and what is in it if it is a folder."""
+    return [source, *(source.iterdir() if source.is_dir() else ())]
 
 
 def _part_progress(progress: Progress, done: int, parts: int, share: float) -> None:
