@@ -245,7 +245,8 @@ def test_classes_as_ids_on_a_real_desk(tmp_path):
     recording, _ = load_recording(
         folder / "camera.json", folder / "odometry_orbslam2_rgbd.txt", boxes, ids="class_id"
     )
-    path = read_trajectory(folder / "odometry_orbslam2_rgbd.txt").world_from_camera
+    odometry = recording.odometry
+    path = _core.dead_reckon(odometry.pose_model, odometry.first_pose, odometry.relative)
     nothing_mapped = Estimate(
         pose_model=_core.PoseModel.SE3,
         camera=recording.camera,
