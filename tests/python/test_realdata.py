@@ -121,7 +121,7 @@ def test_desk_as_it_is(tmp_path):
 def test_desk_is_read_with_its_gaps_and_without_ids():
     folder, files = desk()
     recording, dropped = load_recording(*files.values(), ids="none", min_score=0)
-    assert len(recording.timestamps) == 2893
+    assert len(recording.timestamps) == 2893 + 72  # of the file, and of images between these
     assert len(recording.detections) + dropped.total == 34331
     assert dropped.without_pose > 0
     assert np.isfinite(recording.detections.box).all()
