@@ -62,7 +62,7 @@ struct Observation {
   }
 
  private:
-  std::array<double, 10> lower;  /// triangle of the whitening matrix, column by column
+  std::array<double, 10> lower;  ///< triangle of the whitening matrix, column by column
 };
 
 /// A Gaussian in center and shape.  Its cost is cost + g.d + d.H d / 2 at `origin` + d.
