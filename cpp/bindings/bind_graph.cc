@@ -1,5 +1,9 @@
 #include <pybind11/eigen.h>
+#include <pybind11/native_enum.h>
 #include <pybind11/stl.h>
+
+#include <utility>
+#include <vector>
 
 #include "bindings.h"
 #include "dqslam/problem/graph.h"
@@ -57,6 +61,15 @@ void BindTables(py::module_& m) {
       .def_readonly("log_sigma", &SizePriorTable::log_sigma, "Shape (o,).");
 }
 
+void BindShape(py::module_& m) {
+  py::native_enum<Shape>(m, "Shape", "enum.Enum", "The shape of an object.")
+      .value("ELLIPSOID", Shape::kEllipsoid)
+      .value("CUBOID", Shape::kCuboid)
+      .value("CYLINDER", Shape::kCylinder)
+      .value("AUTO", Shape::kAuto)
+      .finalize();
+}
+
 void BindScenePriors(py::module_& m) {
   py::class_<ScenePriors>(
       m, "ScenePriors", "What is known of the scene; each part is off while its sigma is 0.")
@@ -78,6 +91,7 @@ void BindScenePriors(py::module_& m) {
 
 void BindGraph(py::module_& m) {
   BindTables(m);
+  BindShape(m);
   BindScenePriors(m);
   py::class_<Graph>(m, "Graph", "The problem as plain tables; ids are row numbers. Immutable.")
       .def(py::init([](PoseModel pose_model,
@@ -87,7 +101,8 @@ void BindGraph(py::module_& m) {
                        BoxTable boxes,
                        SizePriorTable size_prior,
                        std::vector<MeasurementTable> measurements,
-                       const ScenePriors& scene_priors) {
+                       const ScenePriors& scene_priors,
+                       std::vector<Shape> shapes) {
              Graph graph{pose_model,
                          camera,
                          initial_poses,
@@ -95,7 +110,8 @@ void BindGraph(py::module_& m) {
                          boxes,
                          measurements,
                          size_prior,
-                         scene_priors};
+                         scene_priors,
+                         std::move(shapes)};
              Validate(graph, /*poses_known=*/true);  // solve() asks for odometry where it needs it
              return graph;
            }),
@@ -108,6 +124,7 @@ void BindGraph(py::module_& m) {
            "size_prior"_a,
            "measurements"_a = std::vector<MeasurementTable>(),
            "scene_priors"_a = ScenePriors(),
+           "shapes"_a = std::vector<Shape>(),
            "initial_poses (n, d): dead reckoning, or the known poses when mapping.")
       .def_readonly("pose_model", &Graph::pose_model)
       .def_readonly("camera", &Graph::camera)
@@ -117,6 +134,7 @@ void BindGraph(py::module_& m) {
       .def_readonly("size_prior", &Graph::size_prior)
       .def_readonly("measurements", &Graph::measurements, "One table a kind.")
       .def_readonly("scene_priors", &Graph::scene_priors)
+      .def_readonly("shapes", &Graph::shapes, "One an object; empty if all are ellipsoids.")
       .def_property_readonly("num_poses", &Graph::num_poses)
       .def_property_readonly("num_objects", &Graph::num_objects);
 }

@@ -2,6 +2,9 @@
 #include <pybind11/native_enum.h>
 #include <pybind11/stl.h>
 
+#include <utility>
+#include <vector>
+
 #include "bindings.h"
 #include "dqslam/estimation/solve.h"
 #include "keywords.h"
@@ -135,12 +138,16 @@ void BindOptions(py::module_& m) {
 
 void BindSolution(py::module_& m) {
   py::class_<State>(m, "State", "Poses and landmark parameters at which a solve can start.")
-      .def(py::init<RowMatrix, RowMatrix>(),
+      .def(py::init([](RowMatrix poses, RowMatrix landmarks, std::vector<Shape> shapes) {
+             return State{std::move(poses), std::move(landmarks), {}, std::move(shapes)};
+           }),
            "poses"_a,
            "landmarks"_a,
-           "Poses (n, d) and landmark parameters (o, 9).")
+           "shapes"_a = std::vector<Shape>(),
+           "Poses (n, d), landmark parameters (o, 9), and their shapes unless all are ellipsoids.")
       .def_readonly("poses", &State::poses, "Poses, shape (n, d).")
-      .def_readonly("landmarks", &State::landmarks, "Landmark parameters, shape (o, 9).");
+      .def_readonly("landmarks", &State::landmarks, "Landmark parameters, shape (o, 9).")
+      .def_readonly("shapes", &State::shapes, "One an object; empty if all are ellipsoids.");
   py::class_<Summary>(m, "Summary", "How a solve went.")
       .def_readonly("initial_cost",
                     &Summary::initial_cost,
@@ -183,6 +190,8 @@ void BindSolution(py::module_& m) {
       .def_readonly("poses", &Solution::poses, "Poses, shape (n, d).")
       .def_readonly(
           "landmarks", &Solution::landmarks, "Parameters in the landmark model, shape (o, 9).")
+      .def_readonly(
+          "shapes", &Solution::shapes, "Shapes of the objects; empty if all are ellipsoids.")
       .def_readonly(
           "dual_quadrics", &Solution::dual_quadrics, "q1 .. q9 of each object, shape (o, 9).")
       .def_readonly(

@@ -30,6 +30,7 @@ if TYPE_CHECKING:  # the one list of public names, a line each: lazy_exports rea
     from dqslam._core import Residual as Residual
     from dqslam._core import ScenePriors as ScenePriors
     from dqslam._core import Schedule as Schedule
+    from dqslam._core import Shape as Shape
     from dqslam._core import SmoothingLevel as SmoothingLevel
     from dqslam._core import SolveOptions as SolveOptions
     from dqslam._core import Start as Start

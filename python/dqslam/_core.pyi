@@ -33,6 +33,7 @@ __all__: list[str] = [
     "ScenePriors",
     "Schedule",
     "Session",
+    "Shape",
     "SizePriorTable",
     "SmoothingLevel",
     "Solution",
@@ -306,6 +307,16 @@ class SizePriorTable:
         Shape (o,).
         """
 
+class Shape(enum.Enum):
+    """
+    The shape of an object.
+    """
+
+    AUTO = 3
+    CUBOID = 1
+    CYLINDER = 2
+    ELLIPSOID = 0
+
 class ScenePriors:
     """
     What is known of the scene; each part is off while its sigma is 0.
@@ -375,6 +386,7 @@ class Graph:
         size_prior: SizePriorTable,
         measurements: collections.abc.Sequence[MeasurementTable] = [],
         scene_priors: ScenePriors = ...,
+        shapes: collections.abc.Sequence[Shape] = [],
     ) -> None:
         """
         initial_poses (n, d): dead reckoning, or the known poses when mapping.
@@ -403,6 +415,11 @@ class Graph:
     def pose_model(self) -> PoseModel: ...
     @property
     def scene_priors(self) -> ScenePriors: ...
+    @property
+    def shapes(self) -> list[Shape]:
+        """
+        One an object; empty if all are ellipsoids.
+        """
     @property
     def size_prior(self) -> SizePriorTable: ...
 
@@ -624,9 +641,10 @@ class State:
         self,
         poses: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
         landmarks: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+        shapes: collections.abc.Sequence[Shape] = [],
     ) -> None:
         """
-        Poses (n, d) and landmark parameters (o, 9).
+        Poses (n, d), landmark parameters (o, 9), and their shapes unless all are ellipsoids.
         """
     @property
     def landmarks(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
@@ -637,6 +655,11 @@ class State:
     def poses(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
         """
         Poses, shape (n, d).
+        """
+    @property
+    def shapes(self) -> list[Shape]:
+        """
+        One an object; empty if all are ellipsoids.
         """
 
 class Summary:
@@ -729,6 +752,11 @@ class Solution:
     def poses(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
         """
         Poses, shape (n, d).
+        """
+    @property
+    def shapes(self) -> list[Shape]:
+        """
+        Shapes of the objects; empty if all are ellipsoids.
         """
     @property
     def summary(self) -> Summary:

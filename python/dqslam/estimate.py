@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from dqslam._checks import Bools, Floats, Ints
-from dqslam._core import Camera, PoseModel, axes_from_ellipsoid, dual_quadric_shapes
+from dqslam._core import Camera, PoseModel, Shape, axes_from_ellipsoid, dual_quadric_shapes
 from dqslam._repr import counted
 
 
@@ -43,6 +43,13 @@ class Estimate:
     """q1 .. q9 with Q*(4,4) = 1, shape (o, 9)."""
     ellipsoids: Floats
     """Center and log-Cholesky shape, shape (o, 9); NaN for an object that is no ellipsoid."""
+    landmarks: Floats = field(default_factory=lambda: np.zeros((0, 9)))
+    """The parameters that were estimated, shape (o, 9): those of the landmark model, or of a
+    cuboid or a cylinder its center [m], the logarithms of its half-lengths [log m], and the
+    rotation vector of world_from_object [rad]."""
+    object_shapes: tuple[Shape, ...] = ()
+    """The shape of each mapped object; empty if all are in the landmark model. In `dual_quadrics`
+    and `ellipsoids`, an ellipsoid with the same second moments stands for a cuboid or cylinder."""
     inliers: Bools = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
     """Whether the chi-square of each box is at most `outlier_chi_square`, shape (b,)."""
     dropped: Mapping[int, str] = field(default_factory=dict)
@@ -82,6 +89,32 @@ class Estimate:
         for row in np.flatnonzero(self.is_ellipsoid):
             rows[row] = np.concatenate(axes_from_ellipsoid(self.ellipsoids[row])[1:])
         return rows
+
+    @property
+    def is_body(self) -> Bools:
+        """Whether each mapped object is a cuboid or a cylinder, shape (o,)."""
+        if not self.object_shapes:
+            return np.zeros(len(self.object_ids), dtype=np.bool_)
+        return np.array([shape != Shape.ELLIPSOID for shape in self.object_shapes], dtype=np.bool_)
+
+    @property
+    def half_lengths(self) -> Floats:
+        """Half-lengths [m] of cuboids and cylinders, shape (o, 3); NaN for an ellipsoid.
+
+        The third of a cylinder is along its axis.
+        """
+        half_lengths = np.full((len(self.object_ids), 3), np.nan)
+        half_lengths[self.is_body] = np.exp(self.landmarks[self.is_body, 3:6])
+        return half_lengths
+
+    @property
+    def volumes(self) -> Floats:
+        """Volume [m^3] of each object in its own shape, (o,); NaN for no real surface."""
+        volumes = 4.0 / 3.0 * np.pi * self.semi_axes.prod(axis=1)
+        for row in np.flatnonzero(self.is_body):
+            is_cuboid = self.object_shapes[row] == Shape.CUBOID
+            volumes[row] = (8.0 if is_cuboid else 2.0 * np.pi) * self.half_lengths[row].prod()
+        return np.asarray(volumes)
 
     @property
     def is_ellipsoid(self) -> Bools:

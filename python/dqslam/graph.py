@@ -1,5 +1,6 @@
 """The problem of a recording as arrays for the core, and its solution as an estimate."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,6 +54,7 @@ def build_graph(
     box_noise: BoxNoise | None = None,
     size_prior: SizePrior | SizePriors | None = None,
     scene_priors: _core.ScenePriors | None = None,
+    shapes: _core.Shape | Mapping[str, _core.Shape] | None = None,
 ) -> Graph:
     """Make the least-squares problem of a recording, with initial poses from dead reckoning.
 
@@ -64,13 +66,17 @@ def build_graph(
     scene_priors
         Priors on the scene, by default none: objects are upright or stand on the ground, and the
         camera has a known height.
+    shapes
+        The shape of all objects, or of each class by name: ``Shape.CUBOID``, ``CYLINDER``,
+        ``ELLIPSOID``, or ``AUTO``, the one that explains an object's boxes best. By default, and
+        for classes that are not named, objects are ellipsoids.
 
     Raises
     ------
     ValueError
         If there are no boxes, if a box has no object id, if there are absolute positions, which
         ``solve_with_absolute_positions`` takes, if a relative position is of an object
-        without boxes or a size prior of a class without boxes, or if the core refuses the problem.
+        without boxes or a size prior or a shape of a class without boxes, or if the core refuses the problem.
 
     Examples
     --------
@@ -108,6 +114,7 @@ def build_graph(
         ),
         measurements=[_table(each, object_ids) for each in _measurements(recording)],
         scene_priors=_core.ScenePriors() if scene_priors is None else scene_priors,
+        shapes=_shapes(shapes, class_names, detections),
     )
     return Graph(
         core=core,
@@ -161,8 +168,9 @@ def solve(
     solution = _core.solve(graph.core, options, start)
     initial_poses = graph.core.initial_poses
     dual_quadrics = as_floats("solution.dual_quadrics", solution.dual_quadrics, [None, 9])
-    if options.landmark_model == _core.LandmarkModel.ELLIPSOID:
-        ellipsoids = as_floats("solution.landmarks", solution.landmarks, [None, 9])
+    landmarks = as_floats("solution.landmarks", solution.landmarks, [None, 9])
+    if options.landmark_model == _core.LandmarkModel.ELLIPSOID and not solution.shapes:
+        ellipsoids = landmarks
     else:
         ellipsoids = np.array([_ellipsoid_or_nan(q) for q in dual_quadrics]).reshape(-1, 9)
     unfit = _unfit(graph, solution.inliers) if options.loss != _core.Loss.NONE else {}
@@ -180,6 +188,10 @@ def solve(
         observations=graph.observations[kept],
         dual_quadrics=dual_quadrics[kept],
         ellipsoids=ellipsoids[kept],
+        landmarks=landmarks[kept],
+        object_shapes=tuple(
+            shape for shape, keep in zip(solution.shapes, kept, strict=False) if keep
+        ),
         inliers=solution.inliers,
         dropped=unfit,
     )
@@ -221,6 +233,23 @@ def _size_priors(
         given.check_classes(set(detections.class_names.values()))
         return [given.of(name) for name in class_names]
     return [SizePrior() if given is None else given] * len(class_names)
+
+
+def _shapes(
+    given: _core.Shape | Mapping[str, _core.Shape] | None,
+    class_names: tuple[str, ...],
+    detections: Detections,
+) -> list[_core.Shape]:
+    """Return the shape of each object, for their class names (o,); none if all are ellipsoids."""
+    if given is None:
+        return []
+    if isinstance(given, _core.Shape):
+        return [given] * len(class_names)
+    for name in given:
+        if name not in detections.class_names.values():
+            names = ", ".join(sorted(set(detections.class_names.values())))
+            raise ValueError(f"shapes: no class {name!r} in the recording, only: {names}")
+    return [given.get(name, _core.Shape.ELLIPSOID) for name in class_names]
 
 
 def _odometry_table(odometry: Odometry, closures: LoopClosures | None) -> _core.OdometryTable:

@@ -10,7 +10,15 @@ from dqslam._checks import Bools, Ints
 
 def rebuilt(core: _core.Graph, **changes: Any) -> _core.Graph:
     """Return a problem with some of its tables replaced."""
-    names = ("initial_poses", "odometry", "boxes", "size_prior", "measurements", "scene_priors")
+    names = (
+        "initial_poses",
+        "odometry",
+        "boxes",
+        "size_prior",
+        "measurements",
+        "scene_priors",
+        "shapes",
+    )
     tables = {name: getattr(core, name) for name in names} | changes
     return _core.Graph(core.pose_model, core.camera, **tables)
 
@@ -33,6 +41,9 @@ def only_objects(core: _core.Graph, kept: Bools) -> _core.Graph:
             log_mean=prior.log_mean[kept], log_sigma=prior.log_sigma[kept]
         ),
         measurements=[_only_kept(table, kept, row) for table in core.measurements],
+        shapes=[shape for shape, keep in zip(core.shapes, kept, strict=True) if keep]
+        if core.shapes
+        else [],
     )
 
 

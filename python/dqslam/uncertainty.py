@@ -44,7 +44,10 @@ class Marginals:
     poses: Floats
     """Covariances in the frame of each pose, translation [m] before rotation [rad]; (n, k, k)."""
     objects: Floats
-    """Covariances of center [m] and log-Cholesky shape, shape (o, 9, 9)."""
+    """Covariances of center [m] and log-Cholesky shape, shape (o, 9, 9).
+
+    Those of cuboids and cylinders are of the parameters in `Estimate.landmarks`.
+    """
     under_constrained: tuple[UnderConstrained, ...]
     """One entry for each pose and object with an undetermined parameter."""
 
@@ -85,9 +88,12 @@ def marginal_covariances(
     options = SolveOptions() if options is None else options
     is_quadric = options.landmark_model == LandmarkModel.DUAL_QUADRIC
     landmarks = estimate.dual_quadrics if is_quadric else estimate.ellipsoids
+    if estimate.is_body.any():
+        landmarks = estimate.landmarks
     mapped = np.isin(graph.object_ids, estimate.object_ids)
     core = graph.core if mapped.all() else only_objects(graph.core, mapped)
-    return _marginals(core, estimate.object_ids, options, _core.State(estimate.poses, landmarks))
+    state = _core.State(estimate.poses, landmarks, list(estimate.object_shapes))
+    return _marginals(core, estimate.object_ids, options, state)
 
 
 def posterior_bound(graph: Graph, truth: Truth) -> Bound:
@@ -117,10 +123,11 @@ def true_state(graph: Graph, truth: Truth, options: SolveOptions) -> _core.State
         return _core.State(truth.poses, truth.ellipsoids[true_rows(graph.object_ids, truth)])
     at_truth = rebuilt(graph.core, initial_poses=truth.poses)
     mapping = SolveOptions(mode=Mode.MAPPING, loss=options.loss)
-    objects = np.array(_core.solve(at_truth, mapping).landmarks)
+    mapped = _core.solve(at_truth, mapping)
+    objects = np.array(mapped.landmarks)
     if truth.ellipsoids is not None:
         objects[exists] = truth.ellipsoids[true_rows(graph.object_ids[exists], truth)]
-    return _core.State(truth.poses, objects)
+    return _core.State(truth.poses, objects, mapped.shapes)
 
 
 def expected_distance(covariances: Floats) -> Floats:

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "dqslam/geometry/ellipsoid.h"
+#include "dqslam/geometry/outline.h"
 #include "oracle.h"
 #include "random.h"
 

@@ -21,12 +21,12 @@ struct BoxCost : AutoDiffCost<BoxCost<Pose, Landmark>, kBoxSize, Pose::kSize, kL
   Eigen::Vector4d observed;          ///< pixels
   Eigen::Matrix4d sqrt_information;  ///< 1 / pixels
   EdgeFlags one_sided = EdgeFlags::Constant(false);
+  Landmark model = {};
 
   template <typename T>
   bool operator()(const T* pose, const T* landmark, T* residual) const {
     Vector4<T> predicted;
-    const Surface<T> surface =
-        ToCamera(LocateCamera<Pose>(pose, mount), Landmark::Unpack(landmark));
+    const auto surface = ToCamera(LocateCamera<Pose>(pose, mount), model.Unpack(landmark));
     if (!ProjectToBox(surface, camera, &predicted)) return false;
     Vector4<T> error = predicted - observed.cast<T>();
     IgnoreBeyond(one_sided, &error);

@@ -5,19 +5,41 @@
 #include "dqslam/costs/whitening.h"
 #include "dqslam/geometry/batch.h"
 #include "dqslam/geometry/dispatch.h"
+#include "dqslam/geometry/outline.h"
 
 namespace dqslam {
+
+namespace {
+
+template <typename Object>
+double ChiSquare(const Object& in_camera,
+                 const Camera& camera,
+                 const Eigen::Vector4d& observed,
+                 const EdgeFlags& truncated,
+                 const Eigen::Matrix4d& sqrt_information) {
+  Eigen::Vector4d predicted;
+  if (!ProjectToBox(in_camera, camera, &predicted)) return std::numeric_limits<double>::infinity();
+  Eigen::Vector4d error = predicted - observed;
+  IgnoreBeyond(OneSidedEdges(truncated, camera, in_camera, predicted), &error);
+  return (sqrt_information * error).squaredNorm();
+}
+
+}  // namespace
 
 double BoxChiSquare(const Surface<double>& in_camera,
                     const Camera& camera,
                     const Eigen::Vector4d& observed,
                     const EdgeFlags& truncated,
                     const Eigen::Matrix4d& sqrt_information) {
-  Eigen::Vector4d predicted;
-  if (!ProjectToBox(in_camera, camera, &predicted)) return std::numeric_limits<double>::infinity();
-  Eigen::Vector4d error = predicted - observed;
-  IgnoreBeyond(OneSidedEdges(truncated, camera, in_camera, predicted), &error);
-  return (sqrt_information * error).squaredNorm();
+  return ChiSquare(in_camera, camera, observed, truncated, sqrt_information);
+}
+
+double BoxChiSquare(const Body<double>& in_camera,
+                    const Camera& camera,
+                    const Eigen::Vector4d& observed,
+                    const EdgeFlags& truncated,
+                    const Eigen::Matrix4d& sqrt_information) {
+  return ChiSquare(in_camera, camera, observed, truncated, sqrt_information);
 }
 
 Eigen::VectorXd BoxChiSquareRows(PoseModel model,

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "dqslam/geometry/blocks.h"
+#include "dqslam/geometry/body.h"
 #include "dqslam/geometry/camera.h"
 #include "dqslam/geometry/ellipsoid.h"
 
@@ -11,6 +12,11 @@ namespace dqslam {
 /// Chi-square of an observed box, of 4 degrees of freedom where all edges count: what BoxCost comes
 /// to when its one-sided edges are those of this surface.  Infinite unless strictly in front.
 double BoxChiSquare(const Surface<double>& in_camera,
+                    const Camera& camera,
+                    const Eigen::Vector4d& observed,
+                    const EdgeFlags& truncated,
+                    const Eigen::Matrix4d& sqrt_information);
+double BoxChiSquare(const Body<double>& in_camera,
                     const Camera& camera,
                     const Eigen::Vector4d& observed,
                     const EdgeFlags& truncated,

@@ -28,11 +28,11 @@ struct TangentCost
   Eigen::Matrix4d sqrt_information;  ///< 1 / pixels
   double depth;                      ///< meters
   EdgeFlags one_sided = EdgeFlags::Constant(false);
+  Landmark model = {};
 
   template <typename T>
   bool operator()(const T* pose, const T* landmark, T* residual) const {
-    const Surface<T> surface =
-        ToCamera(LocateCamera<Pose>(pose, mount), Landmark::Unpack(landmark));
+    const auto surface = ToCamera(LocateCamera<Pose>(pose, mount), model.Unpack(landmark));
     Vector4<T> error;
     if (!TangentDistances(surface, camera, observed, depth, &error)) return false;
     IgnoreBeyond(one_sided, &error, kTangentOutward);

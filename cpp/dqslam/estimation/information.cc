@@ -49,7 +49,9 @@ class JacobianRows {
     const PoseRow pose{context_.graph().boxes.pose[box.row]};
     const ObjectRow object{context_.graph().boxes.object[box.row]};
     if constexpr (Landmark::kModel == LandmarkModel::kEllipsoid) {
-      if (!IsAlgebraic(box.residual.residual)) return VisitEdges(box, pose, object);
+      if (box.shape == Shape::kEllipsoid && !IsAlgebraic(box.residual.residual)) {
+        return VisitEdges(box, pose, object);
+      }
     }
     return VisitBoxCost<Pose, Landmark>(
         context_, box, [&](const auto& cost) { return Visit(cost, pose, object); });

@@ -44,15 +44,6 @@ bool HasImpossibleSize(const SolveContext& context, const State& state, int obje
   return error.square().sum() > kImpossibleSize * std::pow(prior.log_sigma[object], 2);
 }
 
-// The part of a stage that is one object by itself: some boxes of weight 1, with constant poses.
-Stage StageOfObject(const Stage& all, const std::vector<int>& boxes, const Graph& graph) {
-  Stage stage = all;
-  stage.boxes = boxes;
-  stage.weights.clear();
-  stage.end_pose = stage.first_free_pose = graph.boxes.pose[boxes.back()] + 1;
-  return stage;
-}
-
 double WeightOf(const Stage& stage, size_t i) {
   return stage.weights.empty() ? 1 : stage.weights[i];
 }
@@ -109,6 +100,14 @@ std::vector<Vector9d> OtherStarts(const SolveContext& context,
 }
 
 }  // namespace
+
+Stage StageOfObject(const Stage& all, const std::vector<int>& boxes, const Graph& graph) {
+  Stage stage = all;
+  stage.boxes = boxes;
+  stage.weights.clear();
+  stage.end_pose = stage.first_free_pose = graph.boxes.pose[boxes.back()] + 1;
+  return stage;
+}
 
 std::vector<bool> StuckObjects(const SolveContext& context,
                                const Stage& stage,

@@ -8,6 +8,10 @@ namespace dqslam {
 /// The last stage: it has all poses, all boxes and the last residual of the options.
 Stage BatchStage(const SolveContext& context);
 
+/// The part of a stage that is one object by itself: some of its boxes with weight 1, in the order
+/// of their poses, which are constant.
+Stage StageOfObject(const Stage& all, const std::vector<int>& boxes, const Graph& graph);
+
 /// Objects whose boxes in a stage are impossible under the noise model: the median of their
 /// chi-square exceeds 13.28, which is the 99 % quantile, or the mean exceeds twice that.
 std::vector<bool> StuckObjects(const SolveContext& context, const Stage& stage, const State& state);

@@ -9,7 +9,9 @@
 #include "dqslam/estimation/graduated.h"
 #include "dqslam/estimation/grow.h"
 #include "dqslam/estimation/repair.h"
+#include "dqslam/estimation/shapes.h"
 #include "dqslam/estimation/start_object.h"
+#include "dqslam/geometry/body.h"
 #include "dqslam/geometry/dispatch.h"
 #include "dqslam/problem/checks.h"
 
@@ -96,6 +98,7 @@ class Solver {
     state->switches = Eigen::VectorXd::Ones(graph_.boxes.size());
     Summary summary;
     if (start) {
+      state->shapes = start->shapes;
       state->poses = start->poses;
       state->landmarks = start->landmarks;
     } else {
@@ -132,6 +135,7 @@ class Solver {
       Recover(context_, last, state, &summary);
       RestartStuckObjects(context_, last, state, &summary);
       TryOtherStarts(context_, last, false, state, &summary);
+      FitShapes(context_, last, state, &summary);
     }
     return summary;
   }
@@ -256,11 +260,15 @@ Solution Solve(const Graph& graph,
   solution.poses = state.poses;
   solution.inliers = solver.Inliers(state);
   solution.landmarks = state.landmarks;
+  solution.shapes = state.shapes;
   solution.dual_quadrics = state.landmarks;
   if (options.landmark_model == LandmarkModel::kEllipsoid) {
     for (Eigen::Index row = 0; row < state.landmarks.rows(); ++row) {
-      solution.dual_quadrics.row(row) =
-          DualQuadricFromEllipsoid(state.landmarks.row(row).transpose());
+      const double* parameters = state.landmarks.row(row).data();
+      const Shape shape = ShapeOf(state.shapes, static_cast<int>(row));
+      solution.dual_quadrics.row(row) = DualQuadricFromSurface(
+          shape == Shape::kEllipsoid ? EllipsoidModel::Unpack(parameters)
+                                     : EquivalentEllipsoid(BodyModel{shape}.Unpack(parameters)));
     }
   }
   const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - begin;

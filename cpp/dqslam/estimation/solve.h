@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <vector>
 
 #include "dqslam/problem/graph.h"
 #include "dqslam/problem/options.h"
@@ -11,7 +12,9 @@ namespace dqslam {
 struct Solution {
   RowMatrix poses;                ///< (poses, d)
   RowMatrix landmarks;            ///< (objects, 9) parameters of the landmark model
-  RowMatrix dual_quadrics;        ///< (objects, 9) q1 .. q9, for both landmark models
+  std::vector<Shape> shapes;      ///< of the objects; if empty, all are in the landmark model
+  RowMatrix dual_quadrics;        ///< (objects, 9) q1 .. q9, for both landmark models; that of
+                                  ///< the equivalent ellipsoid for cuboids and cylinders
   RowMatrix svd_singular_values;  ///< (objects, 10) of the SVD starts; NaN where not used
   Mask inliers;                   ///< (boxes) chi-square is at most options.outlier_chi_square
   Summary summary;

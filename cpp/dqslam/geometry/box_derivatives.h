@@ -86,14 +86,14 @@ inline void IgnoreBeyond(const EdgeFlags& one_sided,
 /// Error of each edge of an observed box.  It is that of the exact box if `depth` is 0, and else
 /// that of the tangents at this depth.  There are derivatives with kDerivatives.  Returns false if
 /// an error is undefined.
-template <bool kDerivatives>
-bool EdgeErrors(const Surface<double>& in_camera,
+template <bool kDerivatives, typename Object, typename Derivatives>
+bool EdgeErrors(const Object& in_camera,
                 const Camera& camera,
                 const Eigen::Vector4d& observed,
                 double depth,
                 const EdgeFlags& one_sided,
                 Eigen::Vector4d* error,
-                EdgeDerivatives* edges) {
+                Derivatives* edges) {
   const bool is_box = depth == 0;
   bool defined = false;
   if constexpr (kDerivatives) {

@@ -7,8 +7,6 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "dqslam/geometry/outline.h"
-
 namespace dqslam {
 
 double TangentDepth(const Surface<double>& in_camera) {
@@ -33,14 +31,6 @@ Eigen::Matrix<double, 4, 2> TouchingPoints(const Surface<double>& in_camera,
         camera.fy * pole.y() / pole.z() + camera.cy;
   }
   return points;
-}
-
-EdgeFlags OneSidedEdges(const EdgeFlags& truncated,
-                        const Camera& camera,
-                        const Surface<double>& in_camera,
-                        const Eigen::Vector4d& predicted) {
-  if (!truncated.any()) return truncated;
-  return truncated || EdgesOutOfSight(in_camera, camera, predicted);
 }
 
 Vector9d DualQuadricFromSurface(const Surface<double>& surface) {

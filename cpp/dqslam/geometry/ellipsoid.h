@@ -136,14 +136,6 @@ Eigen::Matrix<double, 4, 2> TouchingPoints(const Surface<double>& in_camera,
                                            const Camera& camera,
                                            const Eigen::Vector4d& box);
 
-/// Edges of a box that only bound the object: those that the image border cut and, on boxes with
-/// such an edge, those that `in_camera` touches outside the image, where the detector could not see
-/// it.  The box `predicted` is that of ProjectToBox.
-EdgeFlags OneSidedEdges(const EdgeFlags& truncated,
-                        const Camera& camera,
-                        const Surface<double>& in_camera,
-                        const Eigen::Vector4d& predicted);
-
 /// The signs that make errors positive outwards, by edge: for predicted - observed boxes, and for
 /// the distances of TangentDistances.
 inline constexpr double kBoxOutward[] = {-1, -1, 1, 1}, kTangentOutward[] = {1, 1, 1, 1};

@@ -30,15 +30,4 @@ bool ProjectToOutline(const Surface<double>& in_camera,
   return true;
 }
 
-EdgeFlags EdgesOutOfSight(const Surface<double>& in_camera,
-                          const Camera& camera,
-                          const Eigen::Vector4d& box) {
-  const Eigen::Matrix<double, 4, 2> points = TouchingPoints(in_camera, camera, box);
-  EdgeFlags out_of_sight;
-  for (int edge = 0; edge < kBoxSize; ++edge) {
-    out_of_sight[edge] = !camera.Shows(points(edge, 0), points(edge, 1));
-  }
-  return out_of_sight;
-}
-
 }  // namespace dqslam

@@ -1,4 +1,4 @@
-// The outline of an ellipsoid in the image, and the edges of its box that lie outside of the image.
+// The outline of an ellipsoid in the image, and the edges of an object's box that lie outside.
 #pragma once
 
 #include "dqslam/geometry/blocks.h"
@@ -18,10 +18,30 @@ bool ProjectToOutline(const Surface<double>& in_camera,
                       int points,
                       RowMatrix* outline);
 
-/// The edges of an ellipsoid's box that its outline touches outside the image, where no detector
-/// can see it.  The box is that of ProjectToBox.
-EdgeFlags EdgesOutOfSight(const Surface<double>& in_camera,
+/// The edges of an object's box that it touches outside the image, where no detector can see it.
+/// The object is a Surface or a Body, and the box is that of its ProjectToBox.
+template <typename Object>
+EdgeFlags EdgesOutOfSight(const Object& in_camera,
                           const Camera& camera,
-                          const Eigen::Vector4d& box);
+                          const Eigen::Vector4d& box) {
+  const Eigen::Matrix<double, kBoxSize, 2> points = TouchingPoints(in_camera, camera, box);
+  EdgeFlags out_of_sight;
+  for (int edge = 0; edge < kBoxSize; ++edge) {
+    out_of_sight[edge] = !camera.Shows(points(edge, 0), points(edge, 1));
+  }
+  return out_of_sight;
+}
+
+/// Edges of a box that only bound the object: those that the image border cut and, on boxes with
+/// such an edge, those that `in_camera` touches outside the image, where the detector could not see
+/// it.  The box `predicted` is that of ProjectToBox.
+template <typename Object>
+EdgeFlags OneSidedEdges(const EdgeFlags& truncated,
+                        const Camera& camera,
+                        const Object& in_camera,
+                        const Eigen::Vector4d& predicted) {
+  if (!truncated.any()) return truncated;
+  return truncated || EdgesOutOfSight(in_camera, camera, predicted);
+}
 
 }  // namespace dqslam

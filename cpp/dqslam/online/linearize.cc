@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "dqslam/geometry/jets.h"
+#include "dqslam/geometry/outline.h"
 #include "dqslam/solver/terms.h"
 
 namespace dqslam {

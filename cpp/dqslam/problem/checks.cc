@@ -135,6 +135,17 @@ void CheckScenePriors(const ScenePriors& priors) {
   }
 }
 
+namespace {
+
+void CheckShapes(const std::string& name, const std::vector<Shape>& shapes, int num_objects) {
+  if (shapes.empty() || static_cast<int>(shapes.size()) == num_objects) return;
+  throw std::invalid_argument(name + " has " + std::to_string(shapes.size()) +
+                              " entries, expected one for each of " + std::to_string(num_objects) +
+                              " objects, or none");
+}
+
+}  // namespace
+
 void CheckState(const std::string& name, const Graph& graph, const State& state) {
   if (state.poses.rows() != graph.num_poses() || state.poses.cols() != graph.pose_size() ||
       state.landmarks.rows() != graph.num_objects() || state.landmarks.cols() != kLandmarkSize ||
@@ -142,6 +153,10 @@ void CheckState(const std::string& name, const Graph& graph, const State& state)
     throw std::invalid_argument(name + ": need finite poses (" + std::to_string(graph.num_poses()) +
                                 ", " + std::to_string(graph.pose_size()) + ") and landmarks (" +
                                 std::to_string(graph.num_objects()) + ", 9)");
+  }
+  CheckShapes(name + ": shapes", state.shapes, graph.num_objects());
+  if (std::count(state.shapes.begin(), state.shapes.end(), Shape::kAuto) > 0) {
+    throw std::invalid_argument(name + ": shapes: a state has no AUTO");
   }
 }
 
@@ -192,6 +207,7 @@ void Validate(const Graph& graph, bool poses_known) {
     CheckMeasurements(table, table.pose.size(), graph.num_objects());
   }
   CheckScenePriors(graph.scene_priors);
+  CheckShapes("shapes", graph.shapes, graph.num_objects());
 }
 
 }  // namespace dqslam

@@ -7,6 +7,7 @@
 #include "dqslam/geometry/blocks.h"
 #include "dqslam/geometry/camera.h"
 #include "dqslam/geometry/pose.h"
+#include "dqslam/geometry/shape.h"
 
 namespace dqslam {
 
@@ -66,6 +67,7 @@ struct Graph {
   std::vector<MeasurementTable> measurements;
   SizePriorTable size_prior;
   ScenePriors scene_priors;
+  std::vector<Shape> shapes = {};  ///< one for each object; if empty, all are ellipsoids
 
   int num_poses() const { return static_cast<int>(initial_poses.rows()); }
   int num_objects() const { return static_cast<int>(size_prior.log_mean.size()); }
@@ -86,6 +88,9 @@ struct State {
   RowMatrix poses;                ///< (poses, d)
   RowMatrix landmarks;            ///< (objects, 9) in the landmark model of the solve
   Eigen::VectorXd switches = {};  ///< (boxes) of switchable constraints: 1 is on, 0 is off
+  /// How the rows of `landmarks` are read; if empty, all are in the landmark model.  Cuboids and
+  /// cylinders have the parameters of geometry/body.h.
+  std::vector<Shape> shapes = {};
 };
 
 struct Summary {

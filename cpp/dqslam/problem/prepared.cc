@@ -64,14 +64,6 @@ PreparedGraph::PreparedGraph(const Graph& graph, bool poses_known)
   }
 }
 
-EdgeFlags OneSidedEdges(const PreparedGraph& prepared, int box, const Surface<double>& in_camera) {
-  const EdgeFlags truncated = prepared.graph.boxes.truncated.row(box);
-  const Camera& camera = prepared.graph.camera;
-  Eigen::Vector4d predicted;
-  if (!ProjectToBox(in_camera, camera, &predicted)) return truncated;
-  return OneSidedEdges(truncated, camera, in_camera, predicted);
-}
-
 CameraInWorld<double> LocateCamera(const PreparedGraph& prepared, const State& state, int pose) {
   const double* world_from_robot = state.poses.row(pose).data();
   return prepared.graph.pose_model == PoseModel::kSe2

@@ -22,10 +22,6 @@ struct PreparedGraph {
   std::vector<int> odometry_into;  ///< the odometry row that leads to each pose, or -1
 };
 
-/// The one-sided edges of a box of the graph, see geometry/ellipsoid.h.  Where the object is not
-/// strictly in front of the camera, these are the edges that the image border cut.
-EdgeFlags OneSidedEdges(const PreparedGraph& prepared, int box, const Surface<double>& in_camera);
-
 /// The camera at a pose of the state.
 CameraInWorld<double> LocateCamera(const PreparedGraph& prepared, const State& state, int pose);
 

@@ -21,7 +21,8 @@ class ResidualBlocks {
   ResidualBlocks(const SolveContext& context, Loss loss, State* state, ceres::Problem* problem)
       : context_(context), loss_(loss), state_(*state), problem_(*problem) {}
 
-  void AddVariables(const VariableIndex& variables) {
+  void AddVariables(const StageTerms& terms) {
+    const VariableIndex& variables = terms.variables;
     auto* manifold = new PoseManifold<Pose>;  // owned by the problem, shared by all poses
     for (int pose = 0; pose < variables.end_pose; ++pose) {
       double* parameters = ParametersOf(PoseRow{pose});
@@ -32,7 +33,10 @@ class ResidualBlocks {
     for (const int object : variables.objects) {
       double* parameters = ParametersOf(ObjectRow{object});
       problem_.AddParameterBlock(parameters, kLandmarkSize);
-      if (Landmark::kModel != LandmarkModel::kEllipsoid) continue;
+      if (Landmark::kModel != LandmarkModel::kEllipsoid ||
+          ShapeOf(terms.shapes, object) != Shape::kEllipsoid) {
+        continue;
+      }
       if (!of_ellipsoids) of_ellipsoids = new EllipsoidManifold;
       problem_.SetManifold(parameters, of_ellipsoids);
     }
@@ -88,7 +92,7 @@ void MakeCeresProblem(const SolveContext& context,
         using Pose = decltype(pose);
         using Landmark = decltype(landmark);
         ResidualBlocks<Pose, Landmark> blocks(context, stage.loss, state, problem);
-        blocks.AddVariables(terms.variables);
+        blocks.AddVariables(terms);
         VisitTerms<Pose, Landmark>(context.prepared, terms, &blocks);
       });
 }

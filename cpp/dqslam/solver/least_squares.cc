@@ -85,7 +85,7 @@ class StageProblem : public LeastSquares {
   }
 
   bool Retract(const VectorXd& values, const VectorXd& step, VectorXd* moved) const override {
-    return dqslam::Retract<Pose>(terms_.variables, values, step, moved);
+    return dqslam::Retract<Pose>(terms_, values, step, moved);
   }
   bool RetractAlongPath(const VectorXd& values,
                         const VectorXd& step,

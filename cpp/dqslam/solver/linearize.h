@@ -8,9 +8,10 @@
 #include <ceres/loss_function.h>
 
 #include <cmath>
+#include <type_traits>
 #include <vector>
 
-#include "dqslam/geometry/box_derivatives.h"
+#include "dqslam/geometry/body_derivatives.h"
 #include "dqslam/geometry/jets.h"
 #include "dqslam/linear/normal_equations.h"
 #include "dqslam/solver/terms.h"
@@ -22,18 +23,19 @@ using Matrix = Eigen::Matrix<double, kRows, kColumns>;
 
 /// Computes the box or tangent residual of a box, in sigmas, and its Jacobians.  Without
 /// kDerivatives the Jacobians are left unchanged.  Returns false where the residual is undefined.
-template <typename Pose, bool kDerivatives>
+template <typename Pose, bool kDerivatives, typename Landmark>
 bool LinearizeBox(const PreparedGraph& prepared,
                   const StageBox& box,
                   const Station& station,
-                  const Unpacked<EllipsoidModel>& ellipsoid,
+                  const Unpacked<Landmark>& landmark,
                   Eigen::Vector4d* residual,
                   Matrix<kBoxSize, Pose::kTangentSize>* by_pose,
                   Matrix<kBoxSize, kLandmarkSize>* by_object) {
   const Eigen::Vector4d observed = prepared.graph.boxes.box.row(box.row).transpose();
   Eigen::Vector4d error;
-  EdgeDerivatives edges;
-  if (!EdgeErrors<kDerivatives>(ToCamera(station.camera, ellipsoid.surface),
+  std::conditional_t<std::is_same_v<Landmark, BodyModel>, BodyEdgeDerivatives, EdgeDerivatives>
+      edges;
+  if (!EdgeErrors<kDerivatives>(ToCamera(station.camera, landmark.surface),
                                 prepared.graph.camera,
                                 observed,
                                 box.residual.depth,
@@ -47,7 +49,7 @@ bool LinearizeBox(const PreparedGraph& prepared,
   if constexpr (kDerivatives) {
     Matrix<kBoxSize, Pose::kTangentSize> J_pose;
     Matrix<kBoxSize, kLandmarkSize> J_object;
-    ByPoseAndLandmark<Pose>(edges, station, prepared.mount, ellipsoid, &J_pose, &J_object);
+    ByPoseAndLandmark<Pose>(edges, station, prepared.mount, landmark, &J_pose, &J_object);
     by_pose->noalias() = whiten * J_pose;
     by_object->noalias() = whiten * J_object;
   }
@@ -78,8 +80,15 @@ class Linearizer {
       stations_.push_back(Station::At<Pose>(ParametersOf(PoseRow{pose}).values, prepared.mount));
     }
     ellipsoids_.reserve(variables_.num_objects());
+    if (!terms.shapes.empty()) bodies_.resize(variables_.num_objects());
     for (const int object : variables_.objects) {
-      ellipsoids_.emplace_back(ParametersOf(ObjectRow{object}).values);
+      const double* parameters = ParametersOf(ObjectRow{object}).values;
+      ellipsoids_.emplace_back(parameters);
+      const Shape shape = ShapeOf(terms.shapes, object);
+      if (shape != Shape::kEllipsoid) {
+        bodies_[variables_.slot_of_object[object]] =
+            Unpacked<BodyModel>(RoundedModel(shape), parameters);
+      }
     }
   }
 
@@ -104,16 +113,17 @@ class Linearizer {
   bool VisitBox(const StageBox& box) {
     const int pose = prepared_.graph.boxes.pose[box.row];
     const int object = prepared_.graph.boxes.object[box.row];
+    const int slot = variables_.slot_of_object[object];
     Eigen::Vector4d residual;
     Matrix<kBoxSize, kTangent> by_pose;
     Matrix<kBoxSize, kLandmarkSize> by_object;
-    if (!LinearizeBox<Pose, kDerivatives>(prepared_,
-                                          box,
-                                          stations_[pose - variables_.first_pose],
-                                          ellipsoids_[variables_.slot_of_object[object]],
-                                          &residual,
-                                          &by_pose,
-                                          &by_object)) {
+    const auto linearize = [&](const auto& landmark) {
+      const Station& station = stations_[pose - variables_.first_pose];
+      return LinearizeBox<Pose, kDerivatives>(
+          prepared_, box, station, landmark, &residual, &by_pose, &by_object);
+    };
+    if (!(box.shape == Shape::kEllipsoid ? linearize(ellipsoids_[slot])
+                                         : linearize(bodies_[slot]))) {
       return false;
     }
     double rho[3] = {residual.squaredNorm(), 1, 0};
@@ -169,6 +179,7 @@ class Linearizer {
   Accumulator* equations_;
   std::vector<Station> stations_;                     // of all poses
   std::vector<Unpacked<EllipsoidModel>> ellipsoids_;  // by slot
+  std::vector<Unpacked<BodyModel>> bodies_;           // by slot; empty if there are none
   double cost_ = 0;
 };
 

@@ -2,8 +2,9 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
+#include <cmath>
 
-#include "dqslam/geometry/box_derivatives.h"
+#include "dqslam/geometry/body_derivatives.h"
 #include "dqslam/geometry/manifolds.h"
 
 namespace dqslam {
@@ -98,9 +99,44 @@ bool PlusBeside(const MovedPose& viewer,
   return cholesky.info() == Eigen::Success;
 }
 
+bool PlusBody(const double* body, const double* tangent, double* moved) {
+  constexpr double kMostLogChange = 3;
+  bool possible = true;
+  for (int i = 0; i < kLandmarkSize; ++i) moved[i] = body[i] + tangent[i];
+  for (int i = 3; i < 6; ++i) possible = possible && std::abs(tangent[i]) < kMostLogChange;
+  return possible;
+}
+
+template <typename Pose>
+bool PlusBodyBeside(const MovedPose& viewer,
+                    const double* body,
+                    const double* tangent,
+                    double* moved) {
+  const Rigid<double> before = Pose::template WorldFromRobot<double>(viewer.before);
+  const Rigid<double> after = Pose::template WorldFromRobot<double>(viewer.after);
+  const Twist twist = InSpace<Pose>(viewer.tangent);
+  const Vector3d turn = before.rotation * twist.rotation;
+  const Vector3d arm = Vector3d(body) - before.translation;
+  const Unpacked<BodyModel> unpacked(BodyModel(), body);  // as a frame, of any shape
+  Vector9d change = Eigen::Map<const Vector9d>(tangent);
+  change.head<3>() -= before.rotation * twist.translation + turn.cross(arm);
+  change.tail<3>() -= unpacked.by_vector.inverse() * (unpacked.rotation.transpose() * turn);
+  Vector9d changed;
+  if (!PlusBody(body, change.data(), changed.data())) return false;
+  const Matrix3d after_from_before = after.rotation * before.rotation.transpose();
+  const Eigen::AngleAxisd turned(after_from_before *
+                                 Unpacked<BodyModel>(BodyModel(), changed.data()).rotation);
+  Eigen::Map<Vector9d>(moved, kLandmarkSize)
+      << after.translation + after_from_before * (changed.head<3>() - before.translation),
+      changed.segment<3>(3), turned.angle() * turned.axis();
+  return true;
+}
+
 template void PlusBehind<Se2>(const MovedPose&, const double*, const double*, double*);
 template void PlusBehind<Se3>(const MovedPose&, const double*, const double*, double*);
 template bool PlusBeside<Se2>(const MovedPose&, const double*, const double*, double*);
 template bool PlusBeside<Se3>(const MovedPose&, const double*, const double*, double*);
+template bool PlusBodyBeside<Se2>(const MovedPose&, const double*, const double*, double*);
+template bool PlusBodyBeside<Se3>(const MovedPose&, const double*, const double*, double*);
 
 }  // namespace dqslam

@@ -36,4 +36,15 @@ bool PlusBeside(const MovedPose& viewer,
                 const double* tangent,
                 double* moved);
 
+/// Adds a tangent to the parameters of a cuboid or a cylinder.  Returns false where a length
+/// changes by more than a factor of e^3, for which no linearization holds.
+bool PlusBody(const double* body, const double* tangent, double* moved);
+
+/// Moves a cuboid or a cylinder by its tangent relative to a moved pose.
+template <typename Pose>
+bool PlusBodyBeside(const MovedPose& viewer,
+                    const double* body,
+                    const double* tangent,
+                    double* moved);
+
 }  // namespace dqslam

@@ -15,11 +15,12 @@ using Eigen::VectorXd;
 template <typename Pose>
 class Step {
  public:
-  Step(const VariableIndex& variables,
-       const VectorXd& values,
-       const VectorXd& step,
-       VectorXd* moved)
-      : variables_(variables), values_(values), step_(step), moved_(*moved) {
+  Step(const StageTerms& terms, const VectorXd& values, const VectorXd& step, VectorXd* moved)
+      : variables_(terms.variables),
+        shapes_(terms.shapes),
+        values_(values),
+        step_(step),
+        moved_(*moved) {
     moved_ = values;
   }
 
@@ -28,12 +29,18 @@ class Step {
     Pose::Normalize(After(pose));
   }
   bool Move(ObjectRow object) {
+    if (ShapeOf(shapes_, object.row) != Shape::kEllipsoid) {
+      return PlusBody(Before(object), TangentOf(object), After(object));
+    }
     return EllipsoidManifold().Plus(Before(object), TangentOf(object), After(object));
   }
   void MoveBehind(PoseRow previous, PoseRow pose) {
     PlusBehind<Pose>(Moved(previous), Before(pose), TangentOf(pose), After(pose));
   }
   bool MoveBeside(PoseRow viewer, ObjectRow object) {
+    if (ShapeOf(shapes_, object.row) != Shape::kEllipsoid) {
+      return PlusBodyBeside<Pose>(Moved(viewer), Before(object), TangentOf(object), After(object));
+    }
     return PlusBeside<Pose>(Moved(viewer), Before(object), TangentOf(object), After(object));
   }
 
@@ -55,6 +62,7 @@ class Step {
   MovedPose Moved(PoseRow pose) { return {Before(pose), TangentOf(pose), After(pose)}; }
 
   const VariableIndex& variables_;
+  const std::vector<Shape>& shapes_;
   const VectorXd& values_;
   const VectorXd& step_;
   VectorXd& moved_;
@@ -72,11 +80,12 @@ std::vector<int> Viewers(const Graph& graph, const StageTerms& terms) {
 }  // namespace
 
 template <typename Pose>
-bool Retract(const VariableIndex& variables,
+bool Retract(const StageTerms& terms,
              const VectorXd& values,
              const VectorXd& step,
              VectorXd* moved) {
-  Step<Pose> steps(variables, values, step, moved);
+  const VariableIndex& variables = terms.variables;
+  Step<Pose> steps(terms, values, step, moved);
   for (int pose = variables.first_free_pose; pose < variables.end_pose; ++pose) {
     steps.Move(PoseRow{pose});
   }
@@ -92,7 +101,7 @@ bool RetractAlongPath(const PreparedGraph& prepared,
                       const VectorXd& step,
                       VectorXd* moved) {
   const VariableIndex& variables = terms.variables;
-  Step<Pose> steps(variables, values, step, moved);
+  Step<Pose> steps(terms, values, step, moved);
   for (int pose = variables.first_free_pose; pose < variables.end_pose; ++pose) {
     const int row = prepared.odometry_into[pose];
     if (row < 0) {
@@ -107,9 +116,9 @@ bool RetractAlongPath(const PreparedGraph& prepared,
   });
 }
 
-#define DQSLAM_INSTANTIATE(Pose)                                                                  \
-  template bool Retract<Pose>(const VariableIndex&, const VectorXd&, const VectorXd&, VectorXd*); \
-  template bool RetractAlongPath<Pose>(                                                           \
+#define DQSLAM_INSTANTIATE(Pose)                                                               \
+  template bool Retract<Pose>(const StageTerms&, const VectorXd&, const VectorXd&, VectorXd*); \
+  template bool RetractAlongPath<Pose>(                                                        \
       const PreparedGraph&, const StageTerms&, const VectorXd&, const VectorXd&, VectorXd*)
 DQSLAM_INSTANTIATE(Se2);
 DQSLAM_INSTANTIATE(Se3);

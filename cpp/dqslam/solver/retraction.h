@@ -7,7 +7,7 @@ namespace dqslam {
 
 /// Moves each variable by itself.  Returns false where that is impossible.
 template <typename Pose>
-bool Retract(const VariableIndex& variables,
+bool Retract(const StageTerms& terms,
              const Eigen::VectorXd& values,
              const Eigen::VectorXd& step,
              Eigen::VectorXd* moved);

@@ -3,10 +3,10 @@
 #include <ceres/problem.h>
 
 #include "dqslam/costs/box_chi_square.h"
-#include "dqslam/geometry/dispatch.h"
 #include "dqslam/solver/ceres_backend.h"
 #include "dqslam/solver/ceres_problem.h"
 #include "dqslam/solver/trust_region.h"
+#include "dqslam/solver/visit_object.h"
 
 namespace dqslam {
 namespace {
@@ -37,21 +37,17 @@ Summary Optimize(const SolveContext& context, const Stage& stage, State* state) 
 Eigen::VectorXd BoxCosts(const SolveContext& context, const State& state) {
   const Graph& graph = context.graph();
   Eigen::VectorXd costs(graph.boxes.size());
-  Dispatch(graph.pose_model, context.options.landmark_model, [&](auto pose_model, auto landmark) {
-    using Pose = decltype(pose_model);
-    using Landmark = decltype(landmark);
-    for (int row = 0; row < graph.boxes.size(); ++row) {
-      const double* pose = state.poses.row(graph.boxes.pose[row]).data();
-      const double* parameters = state.landmarks.row(graph.boxes.object[row]).data();
-      const Surface<double> surface =
-          ToCamera(LocateCamera<Pose>(pose, context.prepared.mount), Landmark::Unpack(parameters));
-      costs[row] = 0.5 * BoxChiSquare(surface,
+  for (int row = 0; row < graph.boxes.size(); ++row) {
+    const CameraInWorld<double> camera =
+        LocateCamera(context.prepared, state, graph.boxes.pose[row]);
+    VisitObject(context.options, state, graph.boxes.object[row], [&](const auto& in_world) {
+      costs[row] = 0.5 * BoxChiSquare(ToCamera(camera, in_world),
                                       graph.camera,
                                       graph.boxes.box.row(row),
                                       graph.boxes.truncated.row(row),
                                       context.prepared.box_sqrt_information[row]);
-    }
-  });
+    });
+  }
   return costs;
 }
 

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 
+#include "dqslam/geometry/outline.h"
+#include "dqslam/solver/visit_object.h"
+
 namespace dqslam {
 namespace {
 
@@ -25,11 +28,6 @@ VariableIndex IndexVariables(const Graph& graph, const Stage& stage) {
   return variables;
 }
 
-Surface<double> UnpackAny(LandmarkModel model, const double* parameters) {
-  return model == LandmarkModel::kEllipsoid ? EllipsoidModel::Unpack(parameters)
-                                            : DualQuadricModel::Unpack(parameters);
-}
-
 BoxResidual ChooseResidual(const SolveContext& context,
                            const Stage& stage,
                            const State& state,
@@ -37,18 +35,20 @@ BoxResidual ChooseResidual(const SolveContext& context,
   BoxResidual chosen;
   chosen.residual = stage.residual;
   if (IsAlgebraic(stage.residual)) return chosen;
-  const Graph& graph = context.graph();
-  const Surface<double> surface =
-      ToCamera(LocateCamera(context.prepared, state, graph.boxes.pose[row]),
-               UnpackAny(context.options.landmark_model,
-                         state.landmarks.row(graph.boxes.object[row]).data()));
-  chosen.one_sided = OneSidedEdges(context.prepared, row, surface);
-  Eigen::Vector4d predicted;
-  if (stage.residual == Residual::kBox && ProjectToBox(surface, graph.camera, &predicted)) {
-    return chosen;
-  }
-  chosen.residual = Residual::kTangent;
-  chosen.depth = TangentDepth(surface);
+  const BoxTable& boxes = context.graph().boxes;
+  const CameraInWorld<double> camera = LocateCamera(context.prepared, state, boxes.pose[row]);
+  VisitObject(context.options, state, boxes.object[row], [&](const auto& in_world) {
+    const auto in_camera = ToCamera(camera, in_world);
+    chosen.one_sided = boxes.truncated.row(row);
+    Eigen::Vector4d predicted;
+    if (ProjectToBox(in_camera, context.graph().camera, &predicted)) {
+      chosen.one_sided =
+          OneSidedEdges(chosen.one_sided, context.graph().camera, in_camera, predicted);
+      if (stage.residual == Residual::kBox) return;
+    }
+    chosen.residual = Residual::kTangent;
+    chosen.depth = TangentDepth(in_camera);
+  });
   return chosen;
 }
 
@@ -56,7 +56,7 @@ BoxResidual ChooseResidual(const SolveContext& context,
 
 StageTerms SelectTerms(const SolveContext& context, const Stage& stage, const State& state) {
   const Graph& graph = context.graph();
-  StageTerms terms{IndexVariables(graph, stage), {}, {}, {}};
+  StageTerms terms{IndexVariables(graph, stage), state.shapes, {}, {}, {}};
   VariableIndex& variables = terms.variables;
   for (int row = 0; row < graph.odometry.size(); ++row) {
     const auto [earlier, later] = std::minmax(graph.odometry.from[row], graph.odometry.to[row]);
@@ -69,7 +69,10 @@ StageTerms SelectTerms(const SolveContext& context, const Stage& stage, const St
     const int row = stage.boxes[i];
     const double weight = stage.weights.empty() ? 1.0 : stage.weights[i];
     if (weight == 0) continue;
-    terms.boxes.push_back({row, weight, ChooseResidual(context, stage, state, row)});
+    terms.boxes.push_back({row,
+                           weight,
+                           ChooseResidual(context, stage, state, row),
+                           ShapeOf(state.shapes, graph.boxes.object[row])});
   }
   for (const MeasurementTable& table : graph.measurements) {
     std::vector<int>& rows = terms.measurements.emplace_back();

@@ -19,10 +19,12 @@ struct StageBox {
   int row;        ///< in the table of boxes
   double weight;  ///< the factor of its loss
   BoxResidual residual;
+  Shape shape = Shape::kEllipsoid;  ///< of its object
 };
 
 struct StageTerms {
   VariableIndex variables;
+  std::vector<Shape> shapes;  ///< of all objects; if empty, all are ellipsoids
   std::vector<int> odometry;  ///< rows
   std::vector<StageBox> boxes;
   std::vector<std::vector<int>> measurements;  ///< rows, one list a table

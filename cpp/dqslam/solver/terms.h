@@ -10,12 +10,14 @@
 #include <utility>
 
 #include "dqslam/costs/algebraic.h"
+#include "dqslam/costs/body_priors.h"
 #include "dqslam/costs/box.h"
 #include "dqslam/costs/measurements.h"
 #include "dqslam/costs/odometry.h"
 #include "dqslam/costs/scene_priors.h"
 #include "dqslam/costs/size_prior.h"
 #include "dqslam/costs/tangent.h"
+#include "dqslam/geometry/body.h"
 #include "dqslam/geometry/jets.h"
 #include "dqslam/solver/stage_terms.h"
 
@@ -47,12 +49,17 @@ auto VisitBoxCost(const SolveContext& context, const StageBox& box, Visit&& visi
                                       Eigen::Matrix4d::Identity() / context.options.algebraic_sigma,
                                       role.residual == Residual::kAlgebraicNormalized});
   }
-  if (role.residual == Residual::kBox) {
-    return visit(
-        BoxCost<Pose, Landmark>{{}, camera, mount, observed, sqrt_information, role.one_sided});
-  }
-  return visit(TangentCost<Pose, Landmark>{
-      {}, camera, mount, observed, sqrt_information, role.depth, role.one_sided});
+  const auto visit_edges = [&](auto model) {
+    using Model = decltype(model);
+    if (role.residual == Residual::kBox) {
+      return visit(BoxCost<Pose, Model>{
+          {}, camera, mount, observed, sqrt_information, role.one_sided, model});
+    }
+    return visit(TangentCost<Pose, Model>{
+        {}, camera, mount, observed, sqrt_information, role.depth, role.one_sided, model});
+  };
+  return box.shape == Shape::kEllipsoid ? visit_edges(Landmark{})
+                                        : visit_edges(RoundedModel(box.shape));
 }
 
 /// Calls visit(cost) with each prior on an ellipsoid.  Returns false where a call returns false.
@@ -67,6 +74,23 @@ bool VisitObjectPriors(double log_size_mean,
   }
   return scene.support_sigma == 0 ||
          visit(SupportPlaneCost{{}, scene.up, scene.plane_offset, scene.support_sigma});
+}
+
+/// The same for a cuboid or a cylinder.  It is upright, if only weakly, unless the scene says more:
+/// seen from one height, its tilt has no effect to first order.
+template <typename Visit>
+bool VisitBodyPriors(Shape shape,
+                     double log_size_mean,
+                     double log_size_sigma,
+                     const ScenePriors& scene,
+                     double upright_sigma,
+                     Visit&& visit) {
+  if (!visit(BodySizeCost{{}, log_size_mean, log_size_sigma})) return false;
+  if (shape == Shape::kCylinder && !visit(RoundCost{})) return false;
+  const double tilt = scene.upright_sigma > 0 ? scene.upright_sigma : upright_sigma;
+  if (!visit(BodyUprightCost{{}, shape, scene.up, tilt})) return false;
+  return scene.support_sigma == 0 ||
+         visit(BodySupportCost{{}, shape, scene.up, scene.plane_offset, scene.support_sigma});
 }
 
 /// Calls visit(cost) with each prior on a pose.  Returns false where a call returns false.
@@ -112,12 +136,17 @@ bool VisitTerms(const PreparedGraph& prepared, const StageTerms& terms, Visitor*
     if (!defined) return false;
   }
   if constexpr (Landmark::kModel == LandmarkModel::kEllipsoid) {
+    // On the plane the vertical is known.
+    const double upright = Pose::kModel == PoseModel::kSe2 ? 0.2 : 1.0;
     for (const int object : terms.variables.objects) {
-      const bool defined = VisitObjectPriors(
-          graph.size_prior.log_mean[object],
-          graph.size_prior.log_sigma[object],
-          graph.scene_priors,
-          [&](const auto& cost) { return visitor->Visit(cost, ObjectRow{object}); });
+      const double mean = graph.size_prior.log_mean[object];
+      const double sigma = graph.size_prior.log_sigma[object];
+      const Shape shape = ShapeOf(terms.shapes, object);
+      const auto visit = [&](const auto& cost) { return visitor->Visit(cost, ObjectRow{object}); };
+      const bool defined =
+          shape == Shape::kEllipsoid
+              ? VisitObjectPriors(mean, sigma, graph.scene_priors, visit)
+              : VisitBodyPriors(shape, mean, sigma, graph.scene_priors, upright, visit);
       if (!defined) return false;
     }
   }

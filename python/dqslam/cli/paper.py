@@ -71,10 +71,18 @@ def paper(
         bool,
         typer.Option(
             "--bound",
-            help="Compare with the posterior bound and the optimum. For ellipsoids, the estimator "
-            "then uses the true noise of the boxes and the true spread of the sizes.",
+            help="Compare with the posterior bound and the optimum. For objects in their own "
+            "shape, the estimator then uses the true noise of the boxes and the true spread of the "
+            "sizes.",
         ),
     ] = False,
+    shape: Annotated[
+        Literal["ellipsoid", "cuboid", "cylinder", "auto"],
+        typer.Option(
+            help="The shape of the objects in the estimate; auto: the one that explains the boxes "
+            "of an object best."
+        ),
+    ] = "ellipsoid",
     wrong_associations: Annotated[
         float,
         typer.Option(min=0.0, max=0.4, help="Share of boxes with a wrong object id, 0 to 0.4."),
@@ -120,6 +128,7 @@ def paper(
                 method=method,
                 loss=loss,
                 bound=bound,
+                shape=shape,
                 jobs=jobs,
                 backend=backend,
                 scheduler=scheduler,
@@ -146,7 +155,8 @@ def _results(table: "PaperTable") -> "Table":
 
     shown = Table(
         title=f"{table.scenario.name}, seeds {table.seeds[0]} to {table.seeds[-1]}, "
-        f"{table.scenario.objects}, method {table.method}",
+        f"{table.scenario.objects}, method {table.method}"
+        + ("" if table.settings.shape == "ellipsoid" else f", shape {table.settings.shape}"),
         box=SIMPLE_HEAD,
     )
     shown.add_column("mean error of", no_wrap=True)

@@ -65,10 +65,15 @@ def evaluate(estimate: Estimate, truth: Truth) -> Report:
     require(estimate, Estimate, "evaluate", "estimate, summary = solve(graph)")
     require(truth, Truth, "evaluate", "recording, truth = simulate(scenario, seed=0)")
     rows = true_rows(estimate.object_ids, truth)
-    volume_errors = np.abs(cube_volumes(estimate.shapes) - truth.volume[rows])
+    paper_volumes = cube_volumes(estimate.shapes)
+    paper_volumes[estimate.is_body] = estimate.volumes[estimate.is_body]
+    volume_errors = np.abs(paper_volumes - truth.volume[rows])
     real = estimate.is_ellipsoid
     volumes_of = box_volumes if truth.ellipsoids is None else ellipsoid_volumes
-    relative_errors = np.abs(volumes_of(estimate.shapes[real]) / truth.volume[rows][real] - 1.0)
+    volumes = np.full(len(rows), np.nan)
+    volumes[real] = volumes_of(estimate.shapes[real])
+    volumes[estimate.is_body] = estimate.volumes[estimate.is_body]
+    relative_errors = np.abs(volumes[real] / truth.volume[rows][real] - 1.0)
     return Report(
         rmse_pos=position_error(truth.pose_model, estimate.poses, truth.poses),
         odometry_rmse_pos=position_error(truth.pose_model, estimate.initial_poses, truth.poses),

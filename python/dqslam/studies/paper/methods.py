@@ -15,6 +15,7 @@ from dqslam.simulation.scenario import Scenario, WorldSettings
 Method = Literal["dqslam", "paper"]
 LossName = Literal["none", "huber", "cauchy", "dcs", "switchable", "gnc_tls", "gnc_gm"]
 RowName = Literal["monocular", "relative_position"]
+ShapeName = Literal["ellipsoid", "cuboid", "cylinder", "auto"]
 
 LOSSES: tuple[LossName, ...] = get_args(LossName)
 ROWS: tuple[RowName, ...] = ("monocular", "relative_position")
@@ -37,6 +38,8 @@ class Settings:
     loss: LossName = "none"
     bound: bool = False
     """Whether estimates are compared with the posterior bound and the optimum."""
+    shape: ShapeName = "ellipsoid"
+    """The shape of the objects in the estimate."""
 
     def __post_init__(self) -> None:
         """Refuse settings that contradict each other."""
@@ -44,6 +47,8 @@ class Settings:
             raise ValueError(f"loss: {self.loss!r} is none of {', '.join(LOSSES)}")
         if self.method == "paper" and (self.bound or self.loss != "none"):
             raise ValueError("method: the paper's has neither a robust loss nor a bound")
+        if self.method == "paper" and self.shape != "ellipsoid":
+            raise ValueError("method: the paper's has no shapes but its quadrics")
 
 
 def default_loss(scenario: Scenario, method: Method) -> LossName:
@@ -81,31 +86,42 @@ class Assumptions:
 
     box_noise: BoxNoise = field(default_factory=BoxNoise)
     size_prior: SizePrior = field(default_factory=SizePrior)
+    shape: ShapeName = "ellipsoid"
 
     def graph(self, recording: Recording) -> Graph:
         """Lay out a recording as a problem."""
-        return build_graph(recording, box_noise=self.box_noise, size_prior=self.size_prior)
+        return build_graph(
+            recording,
+            box_noise=self.box_noise,
+            size_prior=self.size_prior,
+            shapes=None if self.shape == "ellipsoid" else _core.Shape[self.shape.upper()],
+        )
 
 
 def assumptions_of(scenario: Scenario, settings: Settings) -> Assumptions:
     """Return the default assumptions, or the true ones if a bound needs them.
 
-    Covariances and their bound are only meaningful with the right sigmas. For ellipsoids these
-    are the sigmas of the detector and of the world. For cubes there are no right sigmas.
+    Covariances and their bound are only meaningful with the right sigmas. For objects that are
+    estimated in their own shape these are the sigmas of the detector and of the world. For cubes
+    as ellipsoids there are no right sigmas.
     """
-    if settings.bound and scenario.objects == "ellipsoids":
-        return true_assumptions(scenario)
-    return Assumptions()
+    own_shape = "ellipsoid" if scenario.objects == "ellipsoids" else "cuboid"
+    if settings.bound and settings.shape in (own_shape, "auto"):
+        return replace(true_assumptions(scenario), shape=settings.shape)
+    return Assumptions(shape=settings.shape)
 
 
 def true_assumptions(scenario: Scenario) -> Assumptions:
     """Return the true error of the edges of boxes, and the true spread of the sizes."""
     noise = BoxNoise(pixels=scenario.detector.edge_rms_px, relative=0.0)
-    return Assumptions(noise, true_size_prior(scenario.world))
+    return Assumptions(noise, true_size_prior(scenario.world, cubes=scenario.objects == "cubes"))
 
 
-def true_size_prior(world: WorldSettings) -> SizePrior:
-    """Return mean and sigma of the logarithm of the semi-axes of a world's ellipsoids."""
+def true_size_prior(world: WorldSettings, *, cubes: bool = False) -> SizePrior:
+    """Return mean and sigma of the logarithm of the semi-axes of a world's ellipsoids.
+
+    Those of ``cubes`` are of half their sides.
+    """
     from scipy.stats import norm
 
     size = world.log_normal_size
@@ -120,7 +136,7 @@ def true_size_prior(world: WorldSettings) -> SizePrior:
     shares = (np.arange(1000) + 0.5) / 1000.0  # quantiles stand for the distribution
     side = world.side_mean_m + world.side_sigma_m * norm.ppf(shares)
     log_side = np.log(np.maximum(side, world.side_min_m))
-    low, high = world.semi_axis_factor
+    low, high = (1.0, 1.0) if cubes else world.semi_axis_factor
     log_factor = np.log(low + (high - low) * shares)
     return SizePrior(
         float(log_side.mean() + log_factor.mean() - np.log(2.0)),

@@ -14,6 +14,7 @@ from dqslam.studies.paper.methods import (
     LossName,
     Method,
     Settings,
+    ShapeName,
     assumptions_of,
     default_loss,
     method_options,
@@ -34,6 +35,7 @@ def run_paper(
     method: Method,
     loss: LossName | None = None,
     bound: bool = False,
+    shape: ShapeName = "ellipsoid",
     jobs: int | None = 1,
     backend: Backend | None = None,
     scheduler: str | None = None,
@@ -47,8 +49,10 @@ def run_paper(
         The robust loss on boxes; by default "none", or "gnc_gm" if some ids are wrong.
     bound
         Whether to compare with the posterior bound and the optimum, which needs more solves.
-        For ellipsoids, the estimator then uses the true noise of the boxes and the true spread
-        of the sizes.
+        For objects in their own shape, the estimator then uses the true noise of the boxes and
+        the true spread of the sizes.
+    shape
+        The shape of the objects in the estimate.
     jobs, backend, scheduler
         Where trials run, as in `pool.run_each`. Only times depend on it.
     progress
@@ -57,7 +61,7 @@ def run_paper(
     for name, value, least in (("trials", trials, 1), ("seed", seed, 0)):
         if value < least:
             raise ValueError(f"{name}: expected {least} or more, got {value}")
-    settings = Settings(method, loss or default_loss(scenario, method), bound)
+    settings = Settings(method, loss or default_loss(scenario, method), bound, shape)
     run = partial(_run_seed, scenario=scenario, settings=settings)
     done: list[PaperTrial] = []
     seeds = range(seed, seed + trials)

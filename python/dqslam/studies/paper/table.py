@@ -115,6 +115,8 @@ class PaperTable:
             "loss": self.settings.loss,
             "odometry": {"rmse_pos": asdict(self.odometry)},
         }
+        if self.settings.shape != "ellipsoid":
+            table["shape"] = self.settings.shape
         detector = self.scenario.detector
         if detector.wrong_associations > 0.0:
             table["wrong_associations"] = detector.wrong_associations

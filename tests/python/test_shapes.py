@@ -1,0 +1,105 @@
+"""Cuboids and cylinders from Python: told or found, their sizes, volumes and covariances."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import dqslam as dq
+from dqslam.recording import Recording, Truth
+from dqslam.studies.paper.methods import Settings, assumptions_of
+from dqslam.uncertainty import normalized_squares
+
+NOISE = dq.BoxNoise(pixels=1.0, relative=0.0)
+
+
+@pytest.fixture(scope="module")
+def cubes() -> tuple[Recording, Truth]:
+    recording, truth = dq.simulate(dq.load_scenario("paper"), seed=100)
+    return replace(recording, positions=None), truth
+
+
+@pytest.fixture(scope="module")
+def solved(cubes: tuple[Recording, Truth]) -> tuple[dq.Graph, dq.Estimate]:
+    graph = dq.build_graph(cubes[0], box_noise=NOISE, shapes=dq.Shape.CUBOID)
+    estimate, summary = dq.solve(graph)
+    assert summary.converged
+    return graph, estimate
+
+
+def test_cubes_have_the_volumes_of_cubes(
+    cubes: tuple[Recording, Truth], solved: tuple[dq.Graph, dq.Estimate]
+) -> None:
+    estimate, truth = solved[1], cubes[1]
+    as_ellipsoids, _ = dq.solve(dq.build_graph(cubes[0], box_noise=NOISE))
+    report, before = (dq.evaluate(each, truth) for each in (estimate, as_ellipsoids))
+    assert np.median(report.volume_relative_errors) < 0.03
+    assert np.median(before.volume_relative_errors) > 0.08
+    assert report.rmse_pos < before.rmse_pos
+    assert estimate.is_body.all()
+    assert set(estimate.object_shapes) == {dq.Shape.CUBOID}
+    np.testing.assert_allclose(estimate.volumes, 8.0 * estimate.half_lengths.prod(axis=1))
+    np.testing.assert_allclose(estimate.landmarks[:, :3], estimate.centers, atol=1e-12)
+
+
+def test_an_ellipsoid_of_the_same_moments_stands_for_a_cuboid(
+    solved: tuple[dq.Graph, dq.Estimate],
+) -> None:
+    estimate = solved[1]
+    expected = np.sort(np.sqrt(5.0 / 3.0) * estimate.half_lengths, axis=1)[:, ::-1]
+    np.testing.assert_allclose(estimate.semi_axes, expected, rtol=1e-9)
+
+
+def test_covariances_are_those_of_the_bodies(
+    cubes: tuple[Recording, Truth], solved: tuple[dq.Graph, dq.Estimate]
+) -> None:
+    graph, estimate = solved
+    marginals = dq.marginal_covariances(graph, estimate)
+    assert marginals.under_constrained == ()
+    rows = [cubes[1].object_id.tolist().index(each) for each in estimate.object_ids]
+    errors = cubes[1].center[rows] - estimate.centers
+    assert 0.2 < np.median(normalized_squares(errors, marginals.centers)) < 3.0
+
+
+def test_shapes_by_class_and_by_evidence(cubes: tuple[Recording, Truth]) -> None:
+    recording, _ = cubes
+    by_class = dq.build_graph(recording, shapes={"cube": dq.Shape.CUBOID})
+    assert by_class.core.shapes == [dq.Shape.CUBOID] * len(by_class.object_ids)
+    assert dq.build_graph(recording).core.shapes == []
+    with pytest.raises(ValueError, match="shapes: no class 'box' in the recording, only: cube"):
+        dq.build_graph(recording, shapes={"box": dq.Shape.CUBOID})
+    found, _ = dq.solve(dq.build_graph(recording, box_noise=NOISE, shapes=dq.Shape.AUTO))
+    often_seen = found.observations >= 20
+    assert all(np.array(found.object_shapes)[often_seen] == dq.Shape.CUBOID)
+
+
+def test_ellipsoids_are_not_taken_for_cuboids() -> None:
+    scenario = dq.load_scenario("paper").model_copy(update={"objects": "ellipsoids"})
+    recording, _ = dq.simulate(scenario, seed=100)
+    plain, _ = dq.solve(dq.build_graph(recording, box_noise=NOISE))
+    found, _ = dq.solve(dq.build_graph(recording, box_noise=NOISE, shapes=dq.Shape.AUTO))
+    assert found.object_shapes == ()
+    np.testing.assert_allclose(found.ellipsoids, plain.ellipsoids)
+
+
+def test_a_state_has_a_shape_for_each_object(solved: tuple[dq.Graph, dq.Estimate]) -> None:
+    graph, estimate = solved
+    state = dq.State(estimate.poses, estimate.landmarks, [dq.Shape.CUBOID])
+    with pytest.raises(ValueError, match="start: shapes has 1 entries"):
+        dq.solve(graph, start=state)
+    everywhere = [dq.Shape.AUTO] * len(estimate.object_ids)
+    with pytest.raises(ValueError, match="a state has no AUTO"):
+        dq.solve(graph, start=dq.State(estimate.poses, estimate.landmarks, everywhere))
+
+
+def test_the_paper_is_told_true_sigmas_where_its_objects_have_their_own_shape() -> None:
+    paper = dq.load_scenario("paper")
+    told = assumptions_of(paper, Settings(bound=True, shape="cuboid"))
+    assert told.box_noise.relative == 0.0
+    assert assumptions_of(paper, Settings(bound=True)).box_noise == dq.BoxNoise()
+    # Half of max(0.2, N(0.5, 0.3)): its logarithm, by a sample.
+    sides = np.maximum(np.random.default_rng(1).normal(0.5, 0.3, 200_000), 0.2)
+    assert told.size_prior.log_mean == pytest.approx(np.log(sides / 2).mean(), abs=0.01)
+    assert told.size_prior.log_sigma == pytest.approx(np.log(sides).std(), abs=0.01)
+    with pytest.raises(ValueError, match="no shapes but its quadrics"):
+        Settings("paper", shape="cuboid")
