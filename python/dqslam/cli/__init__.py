@@ -51,6 +51,7 @@ app = typer.Typer(
     name="dqslam",
     epilog="Exit codes\n\n" + "\n".join(f"{code}: {why}" for code, why in EXIT_CODES.items()),
     no_args_is_help=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
     pretty_exceptions_enable=False,
 )
 

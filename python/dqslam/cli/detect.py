@@ -25,7 +25,9 @@ def detect(
         ),
     ],
     model: Annotated[Path, typer.Option(metavar="FILE", help="Detector, an ONNX file.")],
-    out: Annotated[Path, typer.Option(metavar="FILE", help="CSV of boxes to write.")],
+    out: Annotated[
+        Path, typer.Option("--out", "-o", metavar="FILE", help="CSV of boxes to write.")
+    ],
     layout: Annotated[
         str | None,
         typer.Option(
@@ -35,7 +37,7 @@ def detect(
         ),
     ] = None,
     classes: Annotated[
-        str | None,
+        Path | None,
         typer.Option(
             metavar="FILE",
             help="Names of classes: COCO JSON, data.yaml, or text with one name per line; or the "

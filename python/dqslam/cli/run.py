@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from dqslam.assumptions import OdometryNoise
 
 DOUBTFUL = 3  # exit code of a run whose result is doubtful
-NOISE = "translation=0.02,rotation=0.01"
+NOISE = "translation=0.02, rotation=0.01"
 
 
 def run(
@@ -74,8 +74,9 @@ def run(
     ids: Annotated[
         Literal["none", "track_id", "class_id"],
         typer.Option(
-            help="Where the ids of objects come from: there are none, a tracker, or the class, if "
-            "each class has one object."
+            metavar="SOURCE",
+            help="Where the ids of objects come from: none, track_id of a tracker, or class_id if "
+            "each class has one object.",
         ),
     ] = "track_id",
     trust_ids: Annotated[
@@ -111,7 +112,8 @@ def run(
     odometry_covariance: Annotated[
         Path | None,
         typer.Option(
-            help="CSV of the covariance of each step, m and rad squared, instead of one sigma."
+            help="CSV of the covariance of each step, m and rad squared, instead of one sigma.",
+            rich_help_panel="More measurements",
         ),
     ] = None,
     positions: PositionsFile = None,
