@@ -1,4 +1,4 @@
-"""Makes animation.gif: a simulated session, its images on the left and its growing map on the right.
+"""Makes animation.gif: the images of a simulated session, and its growing map from above.
 
 Run by hand after a change: ``./run python docs/figures/animation.py``.
 """

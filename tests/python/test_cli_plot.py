@@ -45,7 +45,7 @@ def names(folder):
 
 def test_with_the_truth(tmp_path, capsys, files):
     code, said = run(
-        capsys, files.results, "--out", tmp_path / "new", "--format", "png",
+        capsys, files.results, "--out", tmp_path / "new", "--kind", "png",
         "--groundtruth", files.groundtruth, "--objects", files.objects,
     )  # fmt: skip
     assert (code, said.err) == (0, "")
@@ -176,7 +176,7 @@ def test_a_sweep(tmp_path, capsys):
         "cells": [{"values": {"noise": 1.0}, "metrics": {"rmse_pos": spread}}],
     }
     (tmp_path / "summary.json").write_text(json.dumps(summary))
-    code, said = run(capsys, tmp_path, "--format", "pdf", "--parameter", "noise")
+    code, said = run(capsys, tmp_path, "--kind", "pdf", "--parameter", "noise")
     assert (code, said.out) == (0, f"wrote {tmp_path / 'figures' / 'sweep.pdf'}\n")
     assert (tmp_path / "figures" / "sweep.pdf").read_bytes().startswith(b"%PDF")
 
