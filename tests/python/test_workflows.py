@@ -45,7 +45,8 @@ def test_keys(path: Path) -> None:
     assert workflow["permissions"] == {"contents": "read"}, "more is given by job, where needed"
     for name, job in workflow["jobs"].items():
         assert "runs-on" in job, name
-        assert set([job["needs"]] if "needs" in job else []) <= set(workflow["jobs"]), name
+        needs = job.get("needs", [])
+        assert set([needs] if isinstance(needs, str) else needs) <= set(workflow["jobs"]), name
     for step in steps(path):
         assert ("run" in step) != ("uses" in step), step
         assert "name" in step or "uses" in step, step
