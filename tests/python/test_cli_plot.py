@@ -12,7 +12,7 @@ from dqslam.cli import main
 from dqslam.io import load_results
 from dqslam.metrics import up_direction
 
-FIGURES = ["boxes", "map", "position_error", "residuals", "rotation_error"]
+FIGURES = ["boxes", "map", "path_error", "position_error", "residuals", "rotation_error"]
 SIZE = (planted.CAMERA.width, planted.CAMERA.height)
 
 
@@ -58,7 +58,7 @@ def test_without_it_json_says_what_is_left_out(tmp_path, capsys, files):
     assert code == 0
     found = json.loads(said.out)
     assert found["figures"] == [str(tmp_path / f"{n}.svg") for n in ("boxes", "map", "residuals")]
-    assert set(found["left_out"]) == {"position_error", "rotation_error"}
+    assert set(found["left_out"]) == {"path_error", "position_error", "rotation_error"}
 
 
 def test_a_simulated_recording_has_its_truth_beside(tmp_path, capsys):
