@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,7 +11,14 @@ import typer
 from dqslam._files import refuse_inputs
 from dqslam._outputs import belongs_to, check_output_set, output_set
 from dqslam.cli.found import read_with_truth
-from dqslam.cli.options import Alignment, TrueObjectsFile, TruthFile
+from dqslam.cli.options import (
+    Alignment,
+    FrameRate,
+    FrameTimesFile,
+    TrueObjectsFile,
+    TruthFile,
+    given_frame_times,
+)
 from dqslam.cli.output import Json, Output, Quiet
 from dqslam.cli.settings import ConfigFile, save_settings
 
@@ -33,6 +41,16 @@ def view(
         Path | None,
         typer.Option(metavar="PAGE", help="Write a folder for any web server, and stop."),
     ] = None,
+    images: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER",
+            help="Show these images behind the boxes of the page of --export. Their times come "
+            "from --frame-times, from their names, or from their order.",
+        ),
+    ] = None,
+    frame_times: FrameTimesFile = None,
+    frame_rate: FrameRate = None,
     rerun: Annotated[
         Path | None, typer.Option(metavar="FILE.rrd", help="Write a Rerun recording, and stop.")
     ] = None,
@@ -60,9 +78,14 @@ def view(
     from dqslam._colors import ESTIMATE
     from dqslam.view import build_scene, rgb, write_rerun
     from dqslam.view.page import WRITTEN_BY, write_page_files
+    from dqslam.view.photographs import write_photographs
 
     output = Output(quiet=quiet, as_json=json)
-    inputs = (directory, groundtruth, objects)
+    if images is not None and export is None:
+        raise ValueError("--images are shown by the page of --export only")
+    if images is not None and find_spec("PIL") is None:
+        raise ValueError("images need Pillow: pip install 'dqslam[plot]'")
+    inputs = (directory, groundtruth, objects, images, frame_times)
     read = [*inputs, *(directory.iterdir() if directory.is_dir() else ())]
     for file in (rerun, ply):
         if file is not None:
@@ -72,10 +95,17 @@ def view(
     with output.waiting("reading"):
         results, truth, true_objects = read_with_truth(directory, groundtruth, objects)
         scene = build_scene(results, groundtruth=truth, objects=true_objects, align=align)
+        times = given_frame_times(frame_times, frame_rate)
+        found = None if images is None else io.find_images(images, results.timestamps, times)
     written: dict[str, str] = {}
     if export is not None:
         with output_set(export, WRITTEN_BY, inputs=inputs) as folder:
-            write_page_files(scene, folder)
+            names = None
+            if found is not None:
+                count = len(results.timestamps)
+                with output.share("images") as progress:
+                    names = write_photographs(found, results.camera, count, folder, progress)
+            write_page_files(scene, folder, images=names)
             save_settings(context, folder / "view.toml")
         belongs_to(directory, export)
         written["page"] = str(export / "index.html")

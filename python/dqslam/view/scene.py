@@ -16,7 +16,7 @@ import numpy as np
 from dqslam import _core
 from dqslam._checks import Floats, Ints
 from dqslam._colors import TRUTH, class_colors, object_colors
-from dqslam.evaluation import common_poses, evaluate_results
+from dqslam.evaluation import common_poses, evaluate_results, fit_boxes
 from dqslam.io import BoxTable, MapObjects, Results, Trajectory, TrueObjects
 from dqslam.metrics import Align, Alignment, up_direction
 from dqslam.view.numbers import Numbers, object_numbers, overview, true_object_numbers
@@ -61,6 +61,8 @@ class SceneObject:
     """Square meters, shape (3, 3); None if unknown."""
     numbers: Numbers
     """Its properties as text."""
+    chi_square: float | None = None
+    """Median chi-square of its boxes that no border cuts, 3.36 is usual; None without any."""
 
     @property
     def ellipsoid(self) -> Floats | None:
@@ -232,6 +234,7 @@ def _mapped_objects(
 ) -> tuple[SceneObject, ...]:
     mapped = results.objects
     numbers = object_numbers(results, evaluation)
+    chi_squares = _chi_squares(results)
     of_object = object_colors(mapped.class_names, colors)
     return tuple(
         SceneObject(
@@ -243,9 +246,23 @@ def _mapped_objects(
             orientation_xyzw=_known(mapped.orientations[row]),
             center_covariance=_known(mapped.center_covariances[row]),
             numbers=numbers[row],
+            chi_square=chi_squares[row],
         )
         for row in range(len(mapped))
     )
+
+
+def _chi_squares(results: Results) -> list[float | None]:
+    """Return the median chi-square of the boxes of each object that were used."""
+    medians: list[float | None] = [None] * len(results.objects)
+    if results.boxes is None:
+        return medians
+    fits = fit_boxes(results)
+    counts = np.isfinite(fits.chi2) & ~results.boxes.held_out
+    for row in np.unique(fits.object_row[counts]).tolist():
+        if row >= 0:
+            medians[row] = float(np.median(fits.chi2[counts & (fits.object_row == row)]))
+    return medians
 
 
 def _true_objects(
