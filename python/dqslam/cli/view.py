@@ -54,6 +54,16 @@ def view(
     rerun: Annotated[
         Path | None, typer.Option(metavar="FILE.rrd", help="Write a Rerun recording, and stop.")
     ] = None,
+    mcap: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.mcap", help="Write MCAP for Foxglove or Lichtblick, and stop."),
+    ] = None,
+    foxglove: Annotated[
+        bool,
+        typer.Option(
+            "--foxglove", help="Play over a websocket for Foxglove or Lichtblick, not on a page."
+        ),
+    ] = False,
     ply: Annotated[
         Path | None, typer.Option(metavar="FILE.ply", help="Write the map as PLY, and stop.")
     ] = None,
@@ -72,11 +82,12 @@ def view(
 ) -> None:
     """Show the map of DIR on a page: trajectory, cameras, objects, boxes, truth. Ctrl-C stops it.
 
-    The live page needs the extra `view`, and --rerun needs `rerun`. --export and --ply need none.
+    The live page needs the extra `view`, --rerun needs `rerun`, --mcap and --foxglove need `mcap`.
+    --export and --ply need none.
     """
     from dqslam import io
     from dqslam._colors import ESTIMATE
-    from dqslam.view import build_scene, rgb, write_rerun
+    from dqslam.view import build_scene, rgb, write_mcap, write_rerun
     from dqslam.view.page import WRITTEN_BY, write_page_files
     from dqslam.view.photographs import write_photographs
 
@@ -87,7 +98,7 @@ def view(
         raise ValueError("images need Pillow: pip install 'dqslam[plot]'")
     inputs = (directory, groundtruth, objects, images, frame_times)
     read = [*inputs, *(directory.iterdir() if directory.is_dir() else ())]
-    for file in (rerun, ply):
+    for file in (rerun, mcap, ply):
         if file is not None:
             refuse_inputs(file, read)
     if export is not None:
@@ -113,6 +124,10 @@ def view(
         with output.share("writing") as progress:
             write_rerun(scene, rerun, progress)
         written["rerun"] = str(rerun)
+    if mcap is not None:
+        with output.share("writing") as progress:
+            write_mcap(scene, mcap, progress)
+        written["mcap"] = str(mcap)
     if ply is not None:
         io.write_ply(ply, results, [rgb(one.color) for one in scene.objects], rgb(ESTIMATE))
         written["ply"] = str(ply)
@@ -120,6 +135,8 @@ def view(
         output.line(f"wrote {path}")
     if written:
         output.document(written)
+    elif foxglove:
+        _play(scene, host, port, output)
     else:
         _serve(scene, host, port, output)
 
@@ -136,5 +153,22 @@ def _serve(scene: Scene, host: str, port: int, output: Output) -> None:
             output.line(f"{address} shows {scene.title}; Ctrl-C stops")
             while True:
                 sleep(3600.0)
+    except KeyboardInterrupt:  # the usual end
+        output.line("stopped")
+
+
+def _play(scene: Scene, host: str, port: int, output: Output) -> None:
+    """Play a scene over a websocket, again and again, until Ctrl-C."""
+    from time import sleep
+
+    from dqslam.view import serve_foxglove
+
+    try:
+        with serve_foxglove(scene, host, port) as (address, play):
+            output.document({"address": address})
+            output.line(f"{address} plays {scene.title} for Foxglove; Ctrl-C stops")
+            while True:
+                play()
+                sleep(1.0)
     except KeyboardInterrupt:  # the usual end
         output.line("stopped")
