@@ -64,7 +64,13 @@ def test_options_of_a_look_stand_beside_it(settings, tmp_path, capsys):
         (figures / "plot.toml", {"command": "plot", "kind": "png"}),
         (
             tmp_path / "page" / "view.toml",
-            {"command": "view", "export": "page", "host": "127.0.0.1", "port": 8080},
+            {
+                "command": "view",
+                "export": "page",
+                "foxglove": False,
+                "host": "127.0.0.1",
+                "port": 8080,
+            },
         ),
     ):
         written = tomllib.loads(path.read_text())
