@@ -23,8 +23,8 @@ def estimate(name, seed, folder):
     main(["run", "--config", str(folder / "run.toml"), "--quiet"])
 
 
-def paint(truth, camera, pose, path):
-    """Paint the true objects as the camera of a pose sees them, far ones first."""
+def paint_image(truth, camera, pose):
+    """Return the true objects as the camera of a pose sees them, far ones first."""
     image = Image.new("RGB", (camera.width, camera.height), (72, 76, 80))
     draw = ImageDraw.Draw(image)
     draw.rectangle([0, 150, camera.width, camera.height], fill=(104, 98, 92))
@@ -45,20 +45,21 @@ def paint(truth, camera, pose, path):
             )
             shade = tuple((color * (0.55 + 0.6 * (1.0 - share))).clip(max=255).astype(int))
             draw.polygon([tuple(point) for point in lit], fill=shade)
-    image.save(path)
+    return image
 
 
 def draw(folder):
     """Draw all figures into a folder, and copy those that the page shows."""
     estimate("paper", 7, folder / "paper")
-    main(["plot", str(folder / "paper"), "--format", "png", "--quiet"])
+    main(["plot", str(folder / "paper"), "--kind", "png", "--quiet"])
     estimate("orbit", 1, folder / "orbit")
     recording, truth = simulate(load_scenario("orbit"), seed=1)
     results = io.load_results(folder / "orbit" / "results")
     images = folder / "images"
     images.mkdir()
-    paint(truth, recording.camera, POSE, images / f"{results.timestamps[POSE]:.6f}.png")
-    main(["plot", str(folder / "orbit"), "--images", str(images), "--format", "png", "--quiet"])
+    image = paint_image(truth, recording.camera, POSE)
+    image.save(images / f"{results.timestamps[POSE]:.6f}.png")
+    main(["plot", str(folder / "orbit"), "--images", str(images), "--kind", "png", "--quiet"])
     (still,) = (folder / "orbit" / "figures" / "images").iterdir()
     keep(still, "images")
     for source, name in (

@@ -8,6 +8,7 @@ TYPE_CHECKING = False  # type checkers know better; typing's own takes longer to
 if TYPE_CHECKING:  # the one list of public names, a line each: lazy_exports reads it, too
     from dqslam import association as association
     from dqslam import assumptions as assumptions
+    from dqslam import detection as detection
     from dqslam import evaluation as evaluation
     from dqslam import inspection as inspection
     from dqslam import io as io

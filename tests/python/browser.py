@@ -1,7 +1,10 @@
 """A real browser without a screen, for the tests of pages; skipped where there is none."""
 
 import shutil
+import threading
 from contextlib import contextmanager
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 
 import pytest
 
@@ -50,3 +53,31 @@ def open_page(browser, address):
     page.close()
     assert mistakes == []
     assert [url for url in requests if not url.startswith((home, "data:", "blob:"))] == []
+
+
+class Silent(SimpleHTTPRequestHandler):
+    def log_message(self, *words):
+        pass
+
+
+@contextmanager
+def web_server(folder):
+    server = ThreadingHTTPServer(("127.0.0.1", 0), partial(Silent, directory=folder))
+    thread = threading.Thread(target=server.serve_forever)
+    thread.start()
+    try:
+        yield f"http://127.0.0.1:{server.server_port}"
+    finally:
+        server.shutdown()
+        thread.join()
+        server.server_close()
+
+
+def settle(page):
+    """Wait until what was asked for is drawn."""
+    page.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+
+
+def on_screen(page):
+    settle(page)
+    return page.evaluate("window.onScreen")

@@ -27,7 +27,7 @@ PARAMETERS = [
 # What a number counts or measures.
 UNITS = (
     r"\bm\b|\brad\b|\bpx\b|meters|seconds|pixels|degrees|share|probability|seed|score|processes"
-    r"|drives|objects|trials|frames|bytes|boxes|port|width|height|times|\bHz\b|dots"
+    r"|drives|objects|trials|frames|images|threads|bytes|boxes|port|width|height|times|\bHz\b|dots"
 )
 
 

@@ -1,4 +1,5 @@
 import json
+from pathlib import Path
 
 import planted
 from dqslam.cli import main
@@ -49,3 +50,27 @@ def test_view_names_what_is_missing(tmp_path, capsys):
     assert main(["view", str(tmp_path / "nothing"), "--export", str(tmp_path / "page")]) == 2
     assert "nothing: no such directory" in capsys.readouterr().err
     assert not (tmp_path / "page").exists()
+
+
+def test_the_truth_that_evaluate_was_given(tmp_path, monkeypatch, capsys):
+    """`plot` and `view` after `evaluate` need not be given the truth again."""
+    monkeypatch.chdir(tmp_path)
+    files = planted.write_planted(tmp_path / "a")
+    files.groundtruth.rename("truth.txt")
+    files.objects.rename("things.csv")
+    truth = ["--groundtruth", "truth.txt", "--objects", "things.csv"]
+    assert main(["evaluate", str(files.results), *truth, "-q"]) == 0
+    found = truth_of(files.results, None, None)
+    assert [str(path) for path in found] == ["truth.txt", "things.csv"]
+    assert main(["view", str(files.results), "--export", "page", "-q"]) == 0
+    scene = json.loads(
+        Path("page/scene.js").read_text().removeprefix("const scene = ").rstrip(";\n")
+    )
+    assert [len(run) for run in scene["truth"]] == [20]
+    assert len(scene["trueObjects"]) == 6
+    other = tmp_path / "other.txt"
+    assert truth_of(files.results, other, None) == (other, None)  # what is given comes first
+    capsys.readouterr()
+    Path("things.csv").unlink()
+    assert main(["view", str(files.results), "--export", "page", "-q"]) == 0
+    assert "things.csv is not there, which `dqslam evaluate` was given" in capsys.readouterr().err

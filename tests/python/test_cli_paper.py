@@ -45,7 +45,7 @@ def test_table_and_figure(tmp_path, capsys):
 
 def test_the_papers_method_shows_its_scan(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(methods, "ALGEBRAIC_SIGMAS", (1e10, 1e15))
-    command = ["paper", "--trials", "1", "--method", "paper", "--objects", "ellipsoids"]
+    command = ["paper", "--trials", "1", "--method", "paper", "--shapes", "ellipsoids"]
     assert main([*command, "--out", str(tmp_path), "--jobs", "1"]) == 0
     table = json.loads((tmp_path / "table.json").read_text())
     assert (table["method"], table["objects"]) == ("paper", "ellipsoids")
@@ -58,7 +58,7 @@ def test_the_papers_method_shows_its_scan(tmp_path, capsys, monkeypatch):
 
 def test_the_bound_and_wrong_ids_add_to_each_row(tmp_path, capsys):
     command = ["paper", "--trials", "1", "--seed", "6", "--jobs", "1", "--bound"]
-    command += ["--wrong-associations", "0.2", "--wrong-association-kind", "structured"]
+    command += ["--wrong-associations", "0.2", "--wrong-kind", "structured"]
     assert main([*command, "--loss", "cauchy", "--out", str(tmp_path)]) == 0
     table = json.loads((tmp_path / "table.json").read_text())
     assert (table["loss"], table["wrong_association_kind"]) == ("cauchy", "structured")
@@ -104,7 +104,7 @@ def test_failures_are_shown(tmp_path, capsys, monkeypatch):
         (["--trials", "many"], "--trials"),
         (["--seed", "-1"], "--seed"),
         (["--jobs", "0"], "--jobs"),
-        (["--objects", "spheres"], "--objects"),
+        (["--shapes", "spheres"], "--shapes"),
         (["--method", "magic"], "--method"),
         (
             ["--scenario", "moon"],
@@ -112,7 +112,7 @@ def test_failures_are_shown(tmp_path, capsys, monkeypatch):
         ),
         (["--wrong-associations", "0.5"], "--wrong-associations"),
         (["--loss", "l1"], "'l1' is not one of 'none', 'huber', 'cauchy', 'dcs', 'switchable'"),
-        (["--wrong-association-kind", "swap"], "'swap' is not one of 'random', 'structured'"),
+        (["--wrong-kind", "swap"], "'swap' is not one of 'random', 'structured'"),
         (["--method", "paper", "--bound"], "method: the paper's has neither"),
         (["--wrong"], "No such option: --wrong"),
     ],

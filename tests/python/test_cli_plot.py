@@ -12,7 +12,7 @@ from dqslam.cli import main
 from dqslam.io import load_results
 from dqslam.metrics import up_direction
 
-FIGURES = ["boxes", "map", "position_error", "residuals", "rotation_error"]
+FIGURES = ["boxes", "map", "path_error", "position_error", "residuals", "rotation_error"]
 SIZE = (planted.CAMERA.width, planted.CAMERA.height)
 
 
@@ -45,7 +45,7 @@ def names(folder):
 
 def test_with_the_truth(tmp_path, capsys, files):
     code, said = run(
-        capsys, files.results, "--out", tmp_path / "new", "--format", "png",
+        capsys, files.results, "--out", tmp_path / "new", "--kind", "png",
         "--groundtruth", files.groundtruth, "--objects", files.objects,
     )  # fmt: skip
     assert (code, said.err) == (0, "")
@@ -58,7 +58,7 @@ def test_without_it_json_says_what_is_left_out(tmp_path, capsys, files):
     assert code == 0
     found = json.loads(said.out)
     assert found["figures"] == [str(tmp_path / f"{n}.svg") for n in ("boxes", "map", "residuals")]
-    assert set(found["left_out"]) == {"position_error", "rotation_error"}
+    assert set(found["left_out"]) == {"path_error", "position_error", "rotation_error"}
 
 
 def test_a_simulated_recording_has_its_truth_beside(tmp_path, capsys):
@@ -176,7 +176,7 @@ def test_a_sweep(tmp_path, capsys):
         "cells": [{"values": {"noise": 1.0}, "metrics": {"rmse_pos": spread}}],
     }
     (tmp_path / "summary.json").write_text(json.dumps(summary))
-    code, said = run(capsys, tmp_path, "--format", "pdf", "--parameter", "noise")
+    code, said = run(capsys, tmp_path, "--kind", "pdf", "--parameter", "noise")
     assert (code, said.out) == (0, f"wrote {tmp_path / 'figures' / 'sweep.pdf'}\n")
     assert (tmp_path / "figures" / "sweep.pdf").read_bytes().startswith(b"%PDF")
 

@@ -56,15 +56,21 @@ def test_options_of_a_look_stand_beside_it(settings, tmp_path, capsys):
     before = (results / "config.toml").exists()
     given = settings(f'directory = "{results}"\nalign = "se2"\n')
     figures = results / "figures"
-    assert main(["plot", *given, "--format", "png", "-q"]) == 0
+    assert main(["plot", *given, "--kind", "png", "-q"]) == 0
     assert main(["view", *given, "--export", "page", "-q"]) == 0
     assert (results / "config.toml").exists() == before  # that is of `run`
     common = {"directory": str(results), "align": "se2"}
     for path, more in (
-        (figures / "plot.toml", {"command": "plot", "format": "png"}),
+        (figures / "plot.toml", {"command": "plot", "kind": "png"}),
         (
             tmp_path / "page" / "view.toml",
-            {"command": "view", "export": "page", "host": "127.0.0.1", "port": 8080},
+            {
+                "command": "view",
+                "export": "page",
+                "foxglove": False,
+                "host": "127.0.0.1",
+                "port": 8080,
+            },
         ),
     ):
         written = tomllib.loads(path.read_text())
@@ -81,11 +87,11 @@ def test_options_of_a_look_stand_beside_it(settings, tmp_path, capsys):
 
 
 def test_paper_and_its_configuration(tmp_path, capsys):
-    options = ["--trials", "1", "--seed", "6", "--jobs", "1", "--objects", "ellipsoids", "-q"]
+    options = ["--trials", "1", "--seed", "6", "--jobs", "1", "--shapes", "ellipsoids", "-q"]
     assert main(["paper", *options, "--out", str(tmp_path / "a")]) == 0
     config = tmp_path / "a" / "config.toml"
     content = tomllib.loads(config.read_text())
-    assert (content["objects"], content["bound"], content["wrong_associations"]) == (
+    assert (content["shapes"], content["bound"], content["wrong_associations"]) == (
         "ellipsoids",
         False,
         0.0,
@@ -131,7 +137,7 @@ def test_all_mistakes_are_said_at_once_with_their_lines(settings, capsys):
         ("simulate", "seed 1\n", "my.toml:1: not a TOML file"),
         ("sweep", 'backend = "magic"\n', "my.toml:1: backend: Input should be 'serial', 'proc"),
         ("sweep", "job = 1\n", "my.toml:1: unknown key job; did you mean jobs?"),
-        ("plot", 'format = "gif"\n', "my.toml:1: format: Input should be 'svg', 'png' or 'pdf'"),
+        ("plot", 'kind = "gif"\n', "my.toml:1: kind: Input should be 'svg', 'png' or 'pdf'"),
         ("plot", "video_rate = 0.0\n", "my.toml:1: video_rate: Input should be greater than or"),
         ("convert", "topics = 1\n", "my.toml:1: unknown key topics; did you mean topic?"),
         ("view", "port = 0\n", "my.toml:1: port: Input should be greater than or equal to 1"),

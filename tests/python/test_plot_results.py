@@ -17,9 +17,9 @@ from dqslam.plot.above import from_above, outline
 from dqslam.plot.boxes import draw_worst_and_median
 from dqslam.plot.errors import draw_errors
 from dqslam.plot.gaps import break_at_gaps
+from dqslam.plot.path_error import draw_path_error
 from dqslam.plot.residuals import draw_residuals
 from dqslam.plot.results_map import MapTruth, draw_results_map
-from dqslam.plot.style import class_styles
 
 SIGNATURES = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}
 
@@ -81,13 +81,6 @@ def test_no_line_crosses_a_gap():
     np.testing.assert_array_equal(np.isnan(times), [0, 0, 0, 1, 0, 0])
     np.testing.assert_array_equal(np.isnan(values[:, 1]), [0, 0, 0, 1, 0, 0])
     assert [len(part) for part in break_at_gaps(np.zeros(1), np.zeros((1, 2)))] == [1, 1]
-
-
-def test_frequent_classes_have_the_first_colors_and_none_two():
-    names = ["a", "b", "b", *"cdefghij"]
-    styles = class_styles(names)
-    assert next(iter(styles)) == "b"
-    assert len({(one["color"], one["linestyle"]) for one in styles.values()}) == len(set(names))
 
 
 def test_the_map_has_every_object_where_it_is(results):
@@ -265,8 +258,8 @@ def test_all_figures_in_each_format(tmp_path, files, results, truth, kind):
         objects=objects,
         progress=shares.append,
     )
-    assert shares == [0.2, 0.4, 0.6, 0.8, 1.0]
-    names = ["boxes", "map", "position_error", "residuals", "rotation_error"]
+    assert shares == [number / 6 for number in range(1, 7)]
+    names = ["boxes", "map", "path_error", "position_error", "residuals", "rotation_error"]
     assert [path.name for path in drawn.written] == [f"{name}.{kind}" for name in names]
     assert sorted(path.name for path in (tmp_path / "new").iterdir()) == [
         f"{name}.{kind}" for name in names
@@ -285,7 +278,13 @@ def test_the_same_results_are_the_same_files(tmp_path, results):
 def test_what_cannot_be_drawn_is_said(tmp_path, results):
     drawn = plot_results(replace(results, boxes=None), tmp_path)
     assert [path.name for path in drawn.written] == ["map.svg"]
-    assert set(drawn.left_out) == {"boxes", "residuals", "position_error", "rotation_error"}
+    assert set(drawn.left_out) == {
+        "boxes",
+        "residuals",
+        "path_error",
+        "position_error",
+        "rotation_error",
+    }
     nothing = replace(results.boxes, object_id=np.full(len(results.boxes), -1))
     drawn = plot_results(replace(results, boxes=nothing), tmp_path)
     assert drawn.left_out["boxes"] == "no box shows an object of the map"
@@ -316,3 +315,20 @@ def test_an_unmoved_world_without_objects(tmp_path, results):
     )
     figure = draw_results_map(replace(results, objects=objects))
     assert not lines(figure.axes[0], "object")
+
+
+def test_the_path_has_the_color_of_its_error(files, results, truth):
+    """Each piece has the mean error of its ends; a pose 3 cm off is found in two of them."""
+    poses = results.poses.copy()
+    poses[7, :3] += planted.TURN.inv().apply([0.03, 0.0, 0.0])
+    moved = replace(results, poses=poses)
+    errors = pose_errors(moved, truth, align="none")
+    figure = draw_path_error(map_truth(results, truth, files), poses[:, :3], errors.distance)
+    (colored,) = [one for one in figure.axes[0].collections if one.get_gid() == "error"]
+    assert len(colored.get_segments()) == len(poses) - 1
+    middle = (errors.distance[1:] + errors.distance[:-1]) / 2
+    np.testing.assert_allclose(colored.get_array(), middle)
+    assert colored.get_clim() == (0.0, errors.distance.max())
+    view = from_above(truth.world_from_camera)
+    end = view.points(truth.world_from_camera[-1:, :3])[0]
+    np.testing.assert_allclose(colored.get_segments()[-1][1], end, atol=1e-6)

@@ -10,10 +10,10 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-import dqslam
+from dqslam import _core
 
 ROOT = Path(__file__).resolve().parents[2]
-CORE = Path(dqslam._core.__file__)
+CORE = Path(_core.__file__)
 LICENSES = ("LICENSE", "ceres-solver.txt", "eigen.txt", "pybind11.txt", "sources.txt")
 
 

@@ -45,7 +45,8 @@ def test_keys(path: Path) -> None:
     assert workflow["permissions"] == {"contents": "read"}, "more is given by job, where needed"
     for name, job in workflow["jobs"].items():
         assert "runs-on" in job, name
-        assert set([job["needs"]] if "needs" in job else []) <= set(workflow["jobs"]), name
+        needs = job.get("needs", [])
+        assert set([needs] if isinstance(needs, str) else needs) <= set(workflow["jobs"]), name
     for step in steps(path):
         assert ("run" in step) != ("uses" in step), step
         assert "name" in step or "uses" in step, step
@@ -86,10 +87,51 @@ def test_actionlint() -> None:
 
 def test_what_cibuildwheel_runs_exists() -> None:
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["cibuildwheel"]
-    commands = " ".join([*settings["test-command"], settings["linux"]["before-all"]])
+    linux, mac = settings["linux"], settings["macos"]
+    commands = " ".join([*linux["test-command"], mac["test-command"], settings["before-all"]])
     scripts = re.findall(r"\.ci/[\w.]+", commands)
-    assert len(scripts) == 3
+    assert len(scripts) == 4
     assert all((ROOT / script).is_file() for script in scripts)
-    folder = settings["linux"]["config-settings"]["cmake.define.DQSLAM_STATIC"]
-    assert folder == "/project/" + settings["linux"]["before-all"].split()[-1]
+    folder = settings["before-all"].split()[-1]
+    assert linux["config-settings"]["cmake.define.DQSLAM_STATIC"] == f"/project/{folder}"
+    assert f"-DDQSLAM_STATIC=$(pwd)/{folder}" in mac["environment"]["CMAKE_ARGS"]
     assert "DQSLAM_STATIC" in (ROOT / "CMakeLists.txt").read_text()
+
+
+def test_a_tag_publishes_all_that_was_built_without_a_token() -> None:
+    """What is uploaded is what is built, and only after it was compared with the other build."""
+    jobs = load(ROOT / ".github" / "workflows" / "wheels.yml")["jobs"]
+    publish = jobs["publish"]
+    assert publish["if"] == "startsWith(github.ref, 'refs/tags/v')"
+    assert set(publish["needs"]) == set(jobs) - {"publish", "sources"}
+    assert publish["permissions"] == {"id-token": "write"}
+    fetched, uploaded = publish["steps"]
+    assert uploaded["uses"].startswith("pypa/gh-action-pypi-publish@")
+    assert "with" not in uploaded and "secrets" not in yaml.safe_dump(jobs)
+    built = [
+        step["with"]["name"]
+        for step in [*jobs["build"]["steps"], *jobs["sdist"]["steps"]]
+        if step.get("uses", "").startswith("actions/upload-artifact@")
+    ]
+    assert built == ["wheels-${{ matrix.machine }}", "wheels-sdist"]
+    assert fetched["with"]["pattern"] == "wheels-*"
+    assert not jobs["sources"]["steps"][-1]["with"]["name"].startswith("wheels-")
+    machines = jobs["build"]["strategy"]["matrix"]["machine"]
+    assert machines == ["ubuntu-24.04", "ubuntu-24.04-arm", "macos-15"]  # x86-64, ARM, ARM
+
+
+@pytest.mark.parametrize(
+    "path", sorted((ROOT / ".github" / "ISSUE_TEMPLATE").glob("*.yml")), ids=lambda path: path.stem
+)
+def test_issue_templates(path: Path) -> None:
+    """The keys that forms of issues have; ids are unique, and each field has a label."""
+    template = yaml.safe_load(path.read_text(encoding="utf-8"))
+    if path.stem == "config":
+        assert template == {"blank_issues_enabled": True}
+        return
+    assert set(template) == {"name", "description", "labels", "body"}
+    fields = [part for part in template["body"] if part["type"] != "markdown"]
+    assert {field["type"] for field in fields} <= {"input", "textarea"}
+    assert all(field["attributes"]["label"] for field in fields)
+    ids = [field["id"] for field in fields]
+    assert len(ids) == len(set(ids)) >= 2

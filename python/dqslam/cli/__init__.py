@@ -20,6 +20,7 @@ from dqslam.cli.ablation import ablation
 from dqslam.cli.convert import convert
 from dqslam.cli.degeneracy import degeneracy
 from dqslam.cli.demo import demo
+from dqslam.cli.detect import detect
 from dqslam.cli.evaluate import evaluate
 from dqslam.cli.inspect import inspect
 from dqslam.cli.paper import paper
@@ -33,7 +34,7 @@ from dqslam.cli.worlds import worlds
 # The commands in the order of the help, by the title of their panel.
 COMMANDS: dict[str, tuple[Callable[..., None], ...]] = {
     "Start here": (demo, paper, simulate),
-    "Your recording": (inspect, convert, run, evaluate),
+    "Your recording": (detect, inspect, convert, run, evaluate),
     "Look": (plot, view),
     "Study": (sweep, worlds, ablation, degeneracy),
 }
@@ -50,6 +51,7 @@ app = typer.Typer(
     name="dqslam",
     epilog="Exit codes\n\n" + "\n".join(f"{code}: {why}" for code, why in EXIT_CODES.items()),
     no_args_is_help=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
     pretty_exceptions_enable=False,
 )
 

@@ -36,7 +36,7 @@ def evaluate(
         Literal["frames", "meters"], typer.Option(help="Unit of --rpe-delta.")
     ] = "frames",
     objects: Annotated[
-        Path | None, typer.Option(help="CSV of true objects: x,y,z,class_name,sx,sy,sz,...")
+        Path | None, typer.Option(help="CSV of true objects: x, y, z, class_name, sx, sy, sz, ...")
     ] = None,
     match: Annotated[
         Literal["nearest", "id"],

@@ -71,24 +71,35 @@ Topics = Annotated[
 ]
 ImageSize = Annotated[
     str | None,
-    typer.Option(
-        metavar="WIDTHxHEIGHT", help="Size of the image in pixels, for a camera that has none."
-    ),
+    typer.Option(metavar="WxH", help="Size of the image in pixels, for a camera that has none."),
 ]
 PositionsFile = Annotated[
     Path | None,
-    typer.Option(help="CSV of measured centers of objects in the camera frame, with final ids."),
+    typer.Option(
+        help="CSV of measured centers of objects in the camera frame, with final ids.",
+        rich_help_panel="More measurements",
+    ),
 ]
 AbsoluteFile = Annotated[
     Path | None,
-    typer.Option(help="CSV of positions of the camera in a frame of their own, like GPS."),
+    typer.Option(
+        help="CSV of positions of the camera in a frame of their own, like GPS.",
+        rich_help_panel="More measurements",
+    ),
 ]
 ClosuresFile = Annotated[
-    Path | None, typer.Option(help="CSV of relative poses of the camera: loop closures.")
+    Path | None,
+    typer.Option(
+        help="CSV of relative poses of the camera: loop closures.",
+        rich_help_panel="More measurements",
+    ),
 ]
 MaxTimeDifference = Annotated[
     float | None,
-    typer.Option(help="Most seconds from a box to its pose. Default: half the interval of poses."),
+    typer.Option(
+        help="Most seconds from a box to its pose. Default: half the interval of poses.",
+        rich_help_panel="What numbers mean",
+    ),
 ]
 # What numbers in the files mean, where it is not what is usual.
 PosesAs = Annotated[
@@ -118,7 +129,9 @@ LengthScale = Annotated[
 BoxForm = Annotated[
     Literal["xyxy", "xywh", "cxcywh", "yxyx"] | None,
     typer.Option(
-        help="What the four numbers of a box are. Default: what the format says.",
+        metavar="FORM",
+        help="What the four numbers of a box are: xyxy, xywh, cxcywh or yxyx. Default: what the "
+        "format says.",
         rich_help_panel="What numbers mean",
     ),
 ]
@@ -154,7 +167,8 @@ TimeScale = Annotated[
     ),
 ]
 ResultDirectory = Annotated[
-    Path, typer.Option("--out", metavar="DIR", help="Directory of the results, created if needed.")
+    Path,
+    typer.Option("--out", "-o", metavar="DIR", help="Directory of the results, created if needed."),
 ]
 MOST_TRIALS = 1_000_000  # a larger number is a slip
 FirstSeed = Annotated[
@@ -183,14 +197,13 @@ Scheduler = Annotated[
 TruthFile = Annotated[
     Path | None,
     typer.Option(
-        help="True trajectory, in any world frame. Default: groundtruth.txt in DIR or its parent."
+        help="True trajectory, in any world frame. Default: groundtruth.txt in DIR, or what "
+        "`dqslam evaluate` was given, or groundtruth.txt in the parent of DIR."
     ),
 ]
 TrueObjectsFile = Annotated[
     Path | None,
-    typer.Option(
-        help="CSV of true objects. Default: objects.csv beside groundtruth.txt, if that is used."
-    ),
+    typer.Option(help="CSV of true objects. Default: found with the true trajectory."),
 ]
 Alignment = Annotated[
     Literal["se3", "sim3", "se2", "none"],

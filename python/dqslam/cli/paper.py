@@ -60,7 +60,9 @@ def paper(
     objects: Annotated[
         Literal["cubes", "ellipsoids"] | None,
         typer.Option(
-            help="cubes, as in the paper; ellipsoids, without model error. Default: the scenario's."
+            "--shapes",
+            help="cubes, as in the paper; ellipsoids, without model error. Default: those of the "
+            "scenario.",
         ),
     ] = None,
     method: Annotated[
@@ -89,7 +91,9 @@ def paper(
     ] = 0.0,
     wrong_association_kind: Annotated[
         Literal["random", "structured"],
-        typer.Option(help="Wrong ids are those of any other object, or of the nearest one."),
+        typer.Option(
+            "--wrong-kind", help="Wrong ids are those of any other object, or of the nearest one."
+        ),
     ] = "random",
     loss: Annotated[
         Literal["none", "huber", "cauchy", "dcs", "switchable", "gnc_tls", "gnc_gm"] | None,

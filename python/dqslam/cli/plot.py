@@ -40,10 +40,12 @@ def plot(
     ],
     out: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="Directory of the figures. Default: DIR/figures."),
+        typer.Option(
+            "--out", "-o", metavar="DIR", help="Directory of the figures. Default: DIR/figures."
+        ),
     ] = None,
     kind: Annotated[
-        Literal["svg", "png", "pdf"], typer.Option("--format", help="File format of the figures.")
+        Literal["svg", "png", "pdf"], typer.Option("--kind", help="File format of the figures.")
     ] = "svg",
     groundtruth: TruthFile = None,
     objects: TrueObjectsFile = None,

@@ -2,11 +2,13 @@
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from dqslam._files import refuse_inputs
 from dqslam._input import refuse_shared_input
 from dqslam._outputs import check_output_set
 from dqslam.cli.options import (
@@ -47,7 +49,7 @@ if TYPE_CHECKING:
     from dqslam.assumptions import OdometryNoise
 
 DOUBTFUL = 3  # exit code of a run whose result is doubtful
-NOISE = "translation=0.02,rotation=0.01"
+NOISE = "translation=0.02, rotation=0.01"
 
 
 def run(
@@ -74,8 +76,9 @@ def run(
     ids: Annotated[
         Literal["none", "track_id", "class_id"],
         typer.Option(
-            help="Where the ids of objects come from: there are none, a tracker, or the class, if "
-            "each class has one object."
+            metavar="SOURCE",
+            help="Where the ids of objects come from: none, track_id of a tracker, or class_id if "
+            "each class has one object.",
         ),
     ] = "track_id",
     trust_ids: Annotated[
@@ -111,7 +114,8 @@ def run(
     odometry_covariance: Annotated[
         Path | None,
         typer.Option(
-            help="CSV of the covariance of each step, m and rad squared, instead of one sigma."
+            help="CSV of the covariance of each step, m and rad squared, instead of one sigma.",
+            rich_help_panel="More measurements",
         ),
     ] = None,
     positions: PositionsFile = None,
@@ -147,6 +151,10 @@ def run(
     letterbox: Letterbox = False,
     time_offset: TimeOffset = 0.0,
     time_scale: TimeScale = 1.0,
+    mcap: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.mcap", help="Also write the result as MCAP, for Foxglove."),
+    ] = None,
     force: Annotated[
         bool,
         typer.Option("--force", help="Go on if poses and boxes do not fit together."),
@@ -215,6 +223,10 @@ def run(
         odometry_covariance=odometry_covariance,
     )
     output = Output(quiet=quiet, as_json=json)
+    if mcap is not None:
+        if find_spec("foxglove") is None:
+            raise ValueError("MCAP needs foxglove-sdk: pip install 'dqslam[mcap]'")
+        refuse_inputs(mcap, inputs)
     # A session shows a line with its state, a batch a bar with the share that is done.
     shown: AbstractContextManager[Callable[[Any], None]] = (
         output.live("loading") if online else output.share("estimating")
@@ -234,6 +246,11 @@ def run(
     output.document(result.report)
     show_report(output, result.report)
     output.line(f"wrote {out}")
+    if mcap is not None:
+        from dqslam.view import build_scene, write_mcap
+
+        write_mcap(build_scene(io.load_results(out)), mcap)
+        output.line(f"wrote {mcap}")
     if result.report["doubts"]:
         raise typer.Exit(DOUBTFUL)
 

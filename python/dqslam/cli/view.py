@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,7 +11,14 @@ import typer
 from dqslam._files import refuse_inputs
 from dqslam._outputs import belongs_to, check_output_set, output_set
 from dqslam.cli.found import read_with_truth
-from dqslam.cli.options import Alignment, TrueObjectsFile, TruthFile
+from dqslam.cli.options import (
+    Alignment,
+    FrameRate,
+    FrameTimesFile,
+    TrueObjectsFile,
+    TruthFile,
+    given_frame_times,
+)
 from dqslam.cli.output import Json, Output, Quiet
 from dqslam.cli.settings import ConfigFile, save_settings
 
@@ -33,9 +41,29 @@ def view(
         Path | None,
         typer.Option(metavar="PAGE", help="Write a folder for any web server, and stop."),
     ] = None,
+    images: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER",
+            help="Show these images behind the boxes of the page of --export. Their times come "
+            "from --frame-times, from their names, or from their order.",
+        ),
+    ] = None,
+    frame_times: FrameTimesFile = None,
+    frame_rate: FrameRate = None,
     rerun: Annotated[
         Path | None, typer.Option(metavar="FILE.rrd", help="Write a Rerun recording, and stop.")
     ] = None,
+    mcap: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.mcap", help="Write MCAP for Foxglove or Lichtblick, and stop."),
+    ] = None,
+    foxglove: Annotated[
+        bool,
+        typer.Option(
+            "--foxglove", help="Play over a websocket for Foxglove or Lichtblick, not on a page."
+        ),
+    ] = False,
     ply: Annotated[
         Path | None, typer.Option(metavar="FILE.ply", help="Write the map as PLY, and stop.")
     ] = None,
@@ -54,17 +82,23 @@ def view(
 ) -> None:
     """Show the map of DIR on a page: trajectory, cameras, objects, boxes, truth. Ctrl-C stops it.
 
-    The live page needs the extra `view`, and --rerun needs `rerun`. --export and --ply need none.
+    The live page needs the extra `view`, --rerun needs `rerun`, --mcap and --foxglove need `mcap`.
+    --export and --ply need none.
     """
     from dqslam import io
     from dqslam._colors import ESTIMATE
-    from dqslam.view import build_scene, rgb, write_rerun
+    from dqslam.view import build_scene, rgb, write_mcap, write_rerun
     from dqslam.view.page import WRITTEN_BY, write_page_files
+    from dqslam.view.photographs import write_photographs
 
     output = Output(quiet=quiet, as_json=json)
-    inputs = (directory, groundtruth, objects)
+    if images is not None and export is None:
+        raise ValueError("--images are shown by the page of --export only")
+    if images is not None and find_spec("PIL") is None:
+        raise ValueError("images need Pillow: pip install 'dqslam[plot]'")
+    inputs = (directory, groundtruth, objects, images, frame_times)
     read = [*inputs, *(directory.iterdir() if directory.is_dir() else ())]
-    for file in (rerun, ply):
+    for file in (rerun, mcap, ply):
         if file is not None:
             refuse_inputs(file, read)
     if export is not None:
@@ -72,10 +106,17 @@ def view(
     with output.waiting("reading"):
         results, truth, true_objects = read_with_truth(directory, groundtruth, objects)
         scene = build_scene(results, groundtruth=truth, objects=true_objects, align=align)
+        times = given_frame_times(frame_times, frame_rate)
+        found = None if images is None else io.find_images(images, results.timestamps, times)
     written: dict[str, str] = {}
     if export is not None:
         with output_set(export, WRITTEN_BY, inputs=inputs) as folder:
-            write_page_files(scene, folder)
+            names = None
+            if found is not None:
+                count = len(results.timestamps)
+                with output.share("images") as progress:
+                    names = write_photographs(found, results.camera, count, folder, progress)
+            write_page_files(scene, folder, images=names)
             save_settings(context, folder / "view.toml")
         belongs_to(directory, export)
         written["page"] = str(export / "index.html")
@@ -83,6 +124,10 @@ def view(
         with output.share("writing") as progress:
             write_rerun(scene, rerun, progress)
         written["rerun"] = str(rerun)
+    if mcap is not None:
+        with output.share("writing") as progress:
+            write_mcap(scene, mcap, progress)
+        written["mcap"] = str(mcap)
     if ply is not None:
         io.write_ply(ply, results, [rgb(one.color) for one in scene.objects], rgb(ESTIMATE))
         written["ply"] = str(ply)
@@ -90,6 +135,8 @@ def view(
         output.line(f"wrote {path}")
     if written:
         output.document(written)
+    elif foxglove:
+        _play(scene, host, port, output)
     else:
         _serve(scene, host, port, output)
 
@@ -106,5 +153,22 @@ def _serve(scene: Scene, host: str, port: int, output: Output) -> None:
             output.line(f"{address} shows {scene.title}; Ctrl-C stops")
             while True:
                 sleep(3600.0)
+    except KeyboardInterrupt:  # the usual end
+        output.line("stopped")
+
+
+def _play(scene: Scene, host: str, port: int, output: Output) -> None:
+    """Play a scene over a websocket, again and again, until Ctrl-C."""
+    from time import sleep
+
+    from dqslam.view import serve_foxglove
+
+    try:
+        with serve_foxglove(scene, host, port) as (address, play):
+            output.document({"address": address})
+            output.line(f"{address} plays {scene.title} for Foxglove; Ctrl-C stops")
+            while True:
+                play()
+                sleep(1.0)
     except KeyboardInterrupt:  # the usual end
         output.line("stopped")

@@ -1,9 +1,11 @@
 """Detected and re-projected boxes, in the frame that fits worst and in the median frame."""
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dqslam._colors import object_colors
 from dqslam.evaluation import BoxFits
 from dqslam.io import Results
 from dqslam.metrics import visible_outlines
@@ -12,7 +14,6 @@ from dqslam.plot.labels import place_labels
 from dqslam.plot.style import (
     COLUMN_INCHES,
     GRAY,
-    class_styles,
     column_style,
     new_figure,
     shown_name,
@@ -38,7 +39,7 @@ def draw_worst_and_median(results: Results, fits: BoxFits) -> "Figure":
     chosen = list(dict.fromkeys([0, len(poses) // 2]))
     names = ("worst", "median")
     camera = results.camera
-    styles = class_styles(results.objects.class_names)
+    colors = object_colors(results.objects.class_names)
     height = min(COLUMN_INCHES * camera.height / camera.width, _TALLEST)
     with column_style():
         figure = new_figure(COLUMN_INCHES, (height + 0.22) * len(chosen) + 0.25)
@@ -49,10 +50,10 @@ def draw_worst_and_median(results: Results, fits: BoxFits) -> "Figure":
                 f"{name}: pose {pose}, mean IoU {overlaps[place]:.2f}", loc="left", pad=2.0
             )
             _frame(axes, camera.width, camera.height)
-            _draw(axes, results, fits, pose, styles)
+            _draw(axes, results, fits, pose, colors)
         _draw_legend(figure, fits, poses[chosen].tolist())
         for axes, place in zip(grid, chosen, strict=True):
-            _name(axes, results, fits, int(poses[place]), styles)
+            _name(axes, results, fits, int(poses[place]), colors)
     return figure
 
 
@@ -71,16 +72,14 @@ def _frame(axes: "Axes", width: int, height: int) -> None:
         spine.set_visible(False)
 
 
-def _draw(
-    axes: "Axes", results: Results, fits: BoxFits, pose: int, styles: dict[str, dict[str, Any]]
-) -> None:
-    detected = draw_boxes(axes, results, fits, pose, styles, lens=False, linewidth=1.0)
+def _draw(axes: "Axes", results: Results, fits: BoxFits, pose: int, colors: Sequence[str]) -> None:
+    detected = draw_boxes(axes, results, fits, pose, colors, lens=False, linewidth=1.0)
     here, ellipsoids = results.poses[pose], results.objects.ellipsoids
     rows, outlines = visible_outlines(results.camera, here, ellipsoids)
     for row, outline in zip(rows, outlines, strict=True):
         if row not in detected:
             continue
-        color = styles[results.objects.class_names[row]]["color"]
+        color = colors[row]
         axes.plot(*outline.T, color=color, linewidth=0.5, gid="outline")
         box = np.concatenate([outline.min(axis=0), outline.max(axis=0)])
         axes.plot(
@@ -88,9 +87,7 @@ def _draw(
         )
 
 
-def _name(
-    axes: "Axes", results: Results, fits: BoxFits, pose: int, styles: dict[str, dict[str, Any]]
-) -> None:
+def _name(axes: "Axes", results: Results, fits: BoxFits, pose: int, colors: Sequence[str]) -> None:
     rows = np.flatnonzero((fits.boxes.pose == pose) & (fits.object_row >= 0))
     objects = results.objects
     seen = fits.object_row[rows]
@@ -98,7 +95,7 @@ def _name(
         axes,
         [rectangle(fits.boxes.box[row]) for row in rows],
         [f"{shown_name(objects.class_names[row])} {objects.object_ids[row]}" for row in seen],
-        [styles[objects.class_names[row]]["color"] for row in seen],
+        [colors[row] for row in seen],
         size=5.5,
     )
 
@@ -110,6 +107,7 @@ def _draw_legend(figure: "Figure", fits: BoxFits, poses: list[int]) -> None:
     handles = [
         Line2D([], [], color="0.2", linewidth=1.0, label="detected"),
         Line2D([], [], color="0.2", linewidth=0.8, linestyle=(0, (3, 1.5)), label="re-projected"),
+        Line2D([], [], color="0.2", linewidth=0.5, label="ellipsoid"),
     ]
     if (here & fits.boxes.held_out).any():
         handles.insert(1, Line2D([], [], color="0.2", linestyle=":", label="held out"))

@@ -15,6 +15,7 @@ from dqslam.plot.style import (
     column_style,
     legend_above,
     new_figure,
+    say_frame,
 )
 
 if TYPE_CHECKING:
@@ -39,13 +40,19 @@ def draw_errors(errors: PoseErrors, kind: Literal["position", "rotation"]) -> "F
     distance = kind == "position"
     with column_style():
         count = max(len(shown), 1) + distance
-        figure = new_figure(COLUMN_INCHES, 0.55 + 0.8 * count)
+        figure = new_figure(COLUMN_INCHES, 0.55 + 0.8 * count + 0.12 * (1 + distance))
         grid = figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0]
         if distance:
             _draw_distance(grid[0], seconds, errors)
         for axes, axis in zip(grid[int(distance) :], shown, strict=False):
             _draw_axis(axes, seconds, values[:, axis], sigmas[:, axis])
             axes.set_ylabel(f"{'xyz'[axis]} [m]" if distance else f"about {'xyz'[axis]} [°]")
+        if distance:
+            say_frame(grid[0], "after alignment")
+        if count > distance:
+            say_frame(
+                grid[int(distance)], "along the axes of the true world, from equal first poses"
+            )
         for axes in grid:
             axes.grid(alpha=0.25, linewidth=0.4)
             axes.margins(x=0.01)

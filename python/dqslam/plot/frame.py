@@ -1,7 +1,7 @@
 """The view of one pose: its boxes, and the objects of the map."""
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,15 +15,13 @@ from dqslam.plot.style import GRAY
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Style = Mapping[str, Any]
-
 
 def draw_boxes(
     axes: "Axes",
     results: Results,
     fits: BoxFits,
     pose: int,
-    styles: Mapping[str, Style],
+    colors: Sequence[str],
     *,
     lens: bool,
     linewidth: float,
@@ -32,7 +30,8 @@ def draw_boxes(
     """Draw the detected boxes of a pose, and return the rows of their objects.
 
     With ``lens``, pixels are those of the image as recorded; otherwise they are undistorted.
-    ``unmapped`` is the color of boxes without an object in the map. Held-out boxes are dotted.
+    ``colors`` are those of the objects of the map, and ``unmapped`` that of boxes without one.
+    Held-out boxes are dotted.
     """
     rows = np.flatnonzero(fits.boxes.pose == pose)
     boxes = fits.boxes.box[rows]
@@ -40,7 +39,7 @@ def draw_boxes(
         boxes = distort_boxes(results.camera, boxes, _tilts(results, fits.object_row[rows], pose))
     for row, box in zip(rows, boxes, strict=True):
         seen = fits.object_row[row]
-        color = unmapped if seen < 0 else styles[results.objects.class_names[seen]]["color"]
+        color = unmapped if seen < 0 else colors[seen]
         held_out = bool(fits.boxes.held_out[row])
         axes.plot(
             *rectangle(box),

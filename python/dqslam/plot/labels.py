@@ -1,75 +1,80 @@
-"""Labels beside outlines, where there is free space."""
+"""Labels as tabs: each is of the color of its outline and touches it, so that it names no other."""
+
+from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dqslam._checks import Bools, Floats
+from dqslam._checks import Floats
+from dqslam._colors import ink_on
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_DIRECTIONS = np.array([(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)])
-_DISTANCES = (3.0, 8.0, 14.0, 22.0)  # distances from the outline, in points
-_LEADER_FROM = 8.0
-_APART = 0.8  # free space around a text, in points
+_ANCHORS = 16  # places on an outline
+_DISTANCES = (0.0, 8.0, 16.0, 26.0)  # of a tab from its outline, in points; a line bridges them
+_PAD = 0.8  # around the text, in points
+_SAMPLES = np.stack(np.meshgrid(np.linspace(-1, 1, 7), np.linspace(-1, 1, 3)), axis=-1)
+# What a candidate costs: share of the tab over other outlines, over its own, share of an outline
+# that it hides, distance in points, and how far it is from the top of its outline, where readers
+# look first.
+_OVER_OTHERS, _OVER_OWN, _HIDES, _PER_POINT, _NOT_ON_TOP = 3.0, 0.6, 2.0, 0.03, 0.12
 
 
 def place_labels(
-    axes: "Axes",
+    axes: Axes,
     outlines: Sequence[Floats],
     texts: Sequence[str],
     colors: Sequence[str],
     *,
     size: float,
 ) -> int:
-    """Write a text beside each outline (2, n), so that none covers another; return their number.
+    """Write a text on a tab at each outline (2, n) and return their number.
 
-    A text is at the nearest of some candidate places that is free. If it is far, a line in the
-    color of the outline leads to it. An outline without a free place gets no text. Limits and size
-    of the axes must be final.
+    A tab touches its outline where it hides the least of others; if there is no free place at it, a
+    line of its color leads there. No tab covers another: an outline without a place for one has
+    none. Limits and size of the axes must be final. Sizes are in points.
     """
-    from matplotlib.patheffects import withStroke
-
     figure = axes.get_figure(root=True)
     assert figure is not None
     figure.draw_without_rendering()
-    to_pixels, to_data = axes.transData.transform, axes.transData.inverted().transform
+    per_point = figure.dpi / 72.0
     frame = np.array(axes.get_window_extent().extents)
-    boxes = [_bounds(to_pixels(one.T)) for one in outlines]
-    shown = [bool(_overlaps(frame, box[None])[0]) for box in boxes]
-    taken = [box for box, one in zip(boxes, shown, strict=True) if one]
-    written = 0
-    for box, text, color, one in zip(boxes, texts, colors, shown, strict=True):
-        if not one:
+    shapes = [axes.transData.transform(one.T) for one in outlines]
+    tabs: list[Floats] = []
+    # Small outlines first: they have the fewest places.
+    for row in np.argsort([np.prod(np.ptp(shape, axis=0)) for shape in shapes], kind="stable"):
+        half = _text_size(axes, texts[row], size) / 2.0 + _PAD * per_point
+        anchors, middles, distance = _candidates(shapes[row], half, frame, per_point)
+        if not len(anchors):
             continue
-        place = _free_place(box, _text_size(axes, text, size), frame, taken, figure.dpi / 72.0)
-        if place is None:
+        best = _cheapest(shapes, int(row), middles, distance / per_point, half, tabs)
+        if best is None:
             continue
-        where, distance = place
-        taken.append(where)
-        line = {"arrowstyle": "-", "linewidth": 0.4, "color": color, "shrinkA": 0, "shrinkB": 0}
-        target, middle = (to_data((one[:2] + one[2:]) / 2.0) for one in (box, where))
+        tabs.append(np.concatenate([middles[best] - half, middles[best] + half]))
+        to_data = axes.transData.inverted().transform
+        line = {"arrowstyle": "-", "linewidth": 0.6, "color": colors[row], "shrinkA": 0}
         axes.annotate(
-            text,
-            (target[0], target[1]),
-            xytext=(middle[0], middle[1]),
+            texts[row],
+            tuple(to_data(anchors[best])),
+            xytext=tuple(to_data(middles[best])),
             fontsize=size,
             ha="center",
-            va="center",
-            color="0.15",
-            bbox={"pad": 0.5, "facecolor": "none", "linewidth": 0.0},  # the end of the line
-            arrowprops=line if distance >= _LEADER_FROM else None,
+            va="center_baseline",
+            color=ink_on(colors[row]),
+            bbox={"pad": _PAD, "facecolor": colors[row], "alpha": 0.9, "linewidth": 0.0},
+            arrowprops=line | {"shrinkB": 0} if distance[best] > 0 else None,
             zorder=6,
             parse_math=False,
-            path_effects=[withStroke(linewidth=1.2, foreground="white")],
+            clip_on=True,
+            gid="name",
         )
-        written += 1
-    return written
+    return len(tabs)
 
 
-def _text_size(axes: "Axes", text: str, size: float) -> Floats:
+def _text_size(axes: Axes, text: str, size: float) -> Floats:
     """Return width and height of a text in pixels."""
     written = axes.text(0, 0, text, fontsize=size, parse_math=False)
     bounds = written.get_window_extent()
@@ -77,28 +82,72 @@ def _text_size(axes: "Axes", text: str, size: float) -> Floats:
     return np.array([bounds.width, bounds.height])
 
 
-def _free_place(
-    box: Floats, size: Floats, frame: Floats, taken: Sequence[Floats], per_point: float
-) -> tuple[Floats, float] | None:
-    """Return the box (4,) of a text of a size, in pixels, and its distance in points."""
-    half = size / 2.0 + _APART * per_point
-    middle, reach = (box[:2] + box[2:]) / 2.0, (box[2:] - box[:2]) / 2.0
-    others = np.array(taken)
+def _candidates(
+    shape: Floats, half: Floats, frame: Floats, per_point: float
+) -> tuple[Floats, Floats, Floats]:
+    """Return places in the frame: where a tab is tied (k, 2), its middle (k, 2), distance (k,)."""
+    turn = np.linspace(0.0, 2.0 * np.pi, _ANCHORS, endpoint=False)
+    outward = np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    # The point of the outline that is farthest in each direction.
+    anchors = shape[(outward @ shape.T).argmax(axis=1)]
+    # From the anchor to the middle of a tab that just touches it.
+    with np.errstate(divide="ignore"):
+        reach = (half / np.abs(outward)).min(axis=1)
+    found = []
     for distance in _DISTANCES:
-        for direction in _DIRECTIONS:
-            at = middle + direction * (reach + half + distance * per_point)
-            place = np.concatenate([at - half, at + half])
-            inside = (place[:2] >= frame[:2]).all() and (place[2:] <= frame[2:]).all()
-            if inside and not _overlaps(place, others).any():
-                return place, distance
-    return None
+        middles = anchors + outward * (reach + distance * per_point)[:, None]
+        found.append((anchors, middles, np.full(_ANCHORS, distance * per_point)))
+    found.append((anchors, anchors - outward * reach[:, None], np.zeros(_ANCHORS)))  # within
+    tied, middle, away = (np.concatenate(part) for part in zip(*found, strict=True))
+    low, high = frame[:2], frame[2:]
+    inside = ((middle - half >= low) & (middle + half <= high)).all(axis=1)
+    inside &= ((tied >= low - 1.0) & (tied <= high + 1.0)).all(axis=1)
+    return tied[inside], middle[inside], away[inside]
 
 
-def _bounds(points: Floats) -> Floats:
-    return np.concatenate([points.min(axis=0), points.max(axis=0)])
+def _cheapest(
+    shapes: Sequence[Floats],
+    own: int,
+    middles: Floats,
+    points: Floats,
+    half: Floats,
+    tabs: Sequence[Floats],
+) -> int | None:
+    """Return the candidate that hides the least, None if each would cover a tab."""
+    low, high = middles - half, middles + half
+    free = np.ones(len(middles), dtype=np.bool_)
+    for tab in tabs:
+        free &= ~((low < tab[2:]) & (high > tab[:2])).all(axis=1)
+    if not free.any():
+        return None
+    samples = middles[:, None] + half * _SAMPLES.reshape(1, -1, 2)
+    top = shapes[own][:, 1].max()
+    tall = max(float(np.ptp(shapes[own][:, 1])), 1.0)
+    cost = _PER_POINT * points + _NOT_ON_TOP * np.abs(top - middles[:, 1]).clip(max=tall) / tall
+    for row, shape in enumerate(shapes):
+        share = _covered(shape, samples)
+        cost += (_OVER_OWN if row == own else _OVER_OTHERS) * share
+        cost += _HIDES * _hidden(shape, low, high)
+    return int(np.where(free, cost, np.inf).argmin())
 
 
-def _overlaps(box: Floats, others: Floats) -> Bools:
-    """Return whether a box (4,) overlaps others (m, 4), which may be points."""
-    low, high = np.maximum(box[:2], others[:, :2]), np.minimum(box[2:], others[:, 2:])
-    return np.asarray((high >= low).all(axis=1))
+def _covered(shape: Floats, samples: Floats) -> Floats:
+    """Return the share of the samples (k, s, 2) of each tab that is within an outline (n, 2)."""
+    from matplotlib.path import Path
+
+    low, high = shape.min(axis=0), shape.max(axis=0)
+    share = np.zeros(len(samples))
+    near = ((samples >= low) & (samples <= high)).all(axis=2).any(axis=1)
+    if len(shape) > 2 and near.any():
+        inside = Path(shape).contains_points(samples[near].reshape(-1, 2))
+        share[near] = inside.reshape(-1, samples.shape[1]).mean(axis=1)
+    return share
+
+
+def _hidden(shape: Floats, low: Floats, high: Floats) -> Floats:
+    """Return the share of an outline (n, 2) that tabs of corners (k, 2), (k, 2) hide, (k,)."""
+    share = np.zeros(len(low))
+    near = ((high >= shape.min(axis=0)) & (low <= shape.max(axis=0))).all(axis=1)
+    within = (shape > low[near, None]) & (shape < high[near, None])
+    share[near] = within.all(axis=2).mean(axis=1)
+    return share

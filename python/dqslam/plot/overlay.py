@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dqslam._checks import Floats
+from dqslam._colors import object_colors
 from dqslam._files import FileError, whole_file
 from dqslam.evaluation import fit_boxes
 from dqslam.io import Results
 from dqslam.metrics import visible_outlines
 from dqslam.plot.frame import draw_boxes
-from dqslam.plot.style import class_styles, column_style, new_figure, save_figure, shown_name
+from dqslam.plot.labels import place_labels
+from dqslam.plot.style import column_style, new_figure, save_figure, shown_name
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -29,15 +31,16 @@ _UNSEEN = (0, (3, 2))
 class Overlay:
     """One image at a time, with the objects of the map.
 
-    Outlines of ellipsoids with a box in the image are thick and have a name. The others are dashed,
-    because the objects may be occluded. Boxes are thin. Those without an object are white.
+    Outlines of ellipsoids with a box in the image are thick and have a name on a tab of their
+    color. The others are dashed, because the objects may be occluded. Boxes are thin. Those without
+    an object are white.
     """
 
     def __init__(self, results: Results) -> None:
         self._results = results
         self.timestamps = results.timestamps
         self._fits = None if results.boxes is None else fit_boxes(results)
-        self._styles = class_styles(results.objects.class_names)
+        self._colors = object_colors(results.objects.class_names)
         camera = results.camera
         self._scale = max(camera.height / 480.0, 0.5)  # lines and names scale with the image
         self.figure = new_figure(camera.width / _DPI, camera.height / _DPI)
@@ -75,7 +78,7 @@ class Overlay:
                 self._results,
                 self._fits,
                 pose,
-                self._styles,
+                self._colors,
                 lens=True,
                 linewidth=0.6 * self._scale,
                 unmapped="white",
@@ -84,49 +87,32 @@ class Overlay:
         rows, outlines = visible_outlines(
             self._results.camera, here, self._results.objects.ellipsoids, lens=True
         )
-        for row, outline in zip(rows, outlines, strict=True):
-            self._draw_object(axes, int(row), outline, is_detected=bool(np.isin(row, detected)))
+        seen = np.isin(rows, detected)
+        for row, outline, is_detected in zip(rows, outlines, seen, strict=True):
+            self._draw_object(axes, int(row), outline, is_detected=bool(is_detected))
+        named = rows[seen].tolist()
+        objects = self._results.objects
+        place_labels(
+            axes,
+            [outlines[row].T for row in np.flatnonzero(seen)],
+            [f"{shown_name(objects.class_names[row])} {objects.object_ids[row]}" for row in named],
+            [self._colors[row] for row in named],
+            size=6.5 * self._scale,
+        )
         return self.figure
 
     def _draw_object(self, axes: "Axes", row: int, outline: Floats, *, is_detected: bool) -> None:
         from matplotlib.patheffects import withStroke
 
-        objects, scale = self._results.objects, self._scale
-        color = self._styles[objects.class_names[row]]["color"]
+        scale = self._scale
         dark = [withStroke(linewidth=2.6 * scale, foreground="black", alpha=0.5)]
         axes.plot(
             *outline.T,
-            color=color,
+            color=self._colors[row],
             linewidth=(1.5 if is_detected else 1.0) * scale,
             linestyle="-" if is_detected else _UNSEEN,
             path_effects=dark if is_detected else None,
             gid="outline",
-        )
-        if is_detected:
-            self._write_name(
-                axes,
-                f"{shown_name(objects.class_names[row])} {objects.object_ids[row]}",
-                outline,
-                color,
-            )
-
-    def _write_name(self, axes: "Axes", name: str, outline: Floats, color: str) -> None:
-        """Write a name above an outline, or as near as possible within the image."""
-        camera, size = self._results.camera, 6.5 * self._scale
-        half = 0.33 * len(name) * size * _DPI / 72.0
-        low, high = np.nanmin(outline, axis=0), np.nanmax(outline, axis=0)
-        axes.text(
-            float(np.clip((low[0] + high[0]) / 2.0, half, max(camera.width - half, half))),
-            float(np.clip(low[1] - 2.0, 2.0 * size, camera.height - 4.0)),
-            name,
-            parse_math=False,
-            color="white",
-            fontsize=size,
-            ha="center",
-            va="bottom",
-            bbox={"facecolor": color, "alpha": 0.75, "linewidth": 0, "pad": 0.8},
-            clip_on=True,
-            gid="name",
         )
 
 

@@ -10,6 +10,7 @@ from dqslam.io import Results, Trajectory, TrueObjects
 from dqslam.metrics import Align
 from dqslam.plot.boxes import draw_worst_and_median
 from dqslam.plot.errors import draw_errors
+from dqslam.plot.path_error import draw_path_error
 from dqslam.plot.residuals import draw_residuals
 from dqslam.plot.results_map import MapTruth, draw_results_map
 from dqslam.plot.style import column_style, save_figure
@@ -40,8 +41,9 @@ def plot_results(
 ) -> Drawn:
     """Draw all figures that the results allow, as files of a kind: "svg", "png" or "pdf".
 
-    These are ``map``, ``boxes``, ``residuals``, and with a true trajectory ``position_error`` and
-    ``rotation_error``. docs/plots.md describes each. If one cannot be drawn, nothing is written.
+    These are ``map``, ``boxes``, ``residuals``, and with a true trajectory ``path_error``,
+    ``position_error`` and ``rotation_error``. docs/plots.md describes each. If one cannot be
+    drawn, nothing is written.
 
     Parameters
     ----------
@@ -57,12 +59,14 @@ def plot_results(
     truth = None
     if groundtruth is None:
         reason = "there is no true trajectory"
-        left_out = {"position_error": reason, "rotation_error": reason}
+        left_out = dict.fromkeys(("path_error", "position_error", "rotation_error"), reason)
     else:
         truth = _map_truth(results, groundtruth, objects, align, max_time_difference)
         errors = pose_errors(
             results, groundtruth, align=align, max_time_difference=max_time_difference
         )
+        rows, _ = common_poses(results.timestamps, groundtruth, max_time_difference)
+        figures["path_error"] = draw_path_error(truth, results.poses[rows, :3], errors.distance)
         figures["position_error"] = draw_errors(errors, "position")
         figures["rotation_error"] = draw_errors(errors, "rotation")
     figures["map"] = draw_results_map(results, truth)

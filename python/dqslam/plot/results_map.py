@@ -8,6 +8,7 @@ import numpy as np
 
 from dqslam import _core
 from dqslam._checks import Floats
+from dqslam._colors import class_colors, is_colored_by_object, object_colors
 from dqslam.io import MapObjects, Results, TrueObjects
 from dqslam.metrics import Alignment
 from dqslam.plot.above import FromAbove, from_above, outline
@@ -16,11 +17,12 @@ from dqslam.plot.labels import place_labels
 from dqslam.plot.style import (
     COLUMN_INCHES,
     ESTIMATE,
+    GRAY,
     ODOMETRY,
     TRUTH,
-    class_styles,
     column_style,
     new_figure,
+    say_frame,
     shown_name,
 )
 
@@ -30,8 +32,9 @@ if TYPE_CHECKING:
 
 _SIGMAS = 2.0
 _POSE_ELLIPSES = 12
+IN_TRUTH = "from above, in the world of the truth, estimate aligned"
 _NAMED_BY_CLASS = 12  # with more objects, labels are numbers, and the legend has the classes
-_WIDTH = 2.8  # width of the map, inches
+WIDTH_INCHES = 2.8  #: of the map, without its axis
 _RATIOS = (0.35, 1.35)  # least and largest ratio of its height to its width
 _LEGEND_COLUMNS = 4
 _MARGIN = 0.06  # margin, share of the size
@@ -66,23 +69,27 @@ def draw_results_map(results: Results, truth: MapTruth | None = None) -> "Figure
         move.apply_poses(poses) for poses in (results.poses, results.initial_poses)
     )
     view = from_above(estimate if truth is None else truth.world_from_camera)
-    styles = class_styles(results.objects.class_names)
+    colors = object_colors(results.objects.class_names)
     true_outlines = [] if truth is None else _true_outlines(view, truth.objects)
     outlines = _outlines(view, results.objects, move)
     paths = [view.points(estimate[:, :3])]
     if truth is not None:
         paths.append(view.points(truth.world_from_camera[:, :3]))
-    low, high = _window(paths, [view.points(odometry[:, :3]), *(o.T for o in outlines)])
+    low, high = window(paths, [view.points(odometry[:, :3]), *(o.T for o in outlines)])
     with column_style():
         width, height = high - low
-        rows = -(-len(styles) // _LEGEND_COLUMNS) + 1
-        figure = new_figure(COLUMN_INCHES, _WIDTH * float(height / width) + 0.42 + 0.14 * rows)
+        entries = _legend_entries(results, truth)
+        rows = -(-len(entries) // _LEGEND_COLUMNS)
+        figure = new_figure(
+            COLUMN_INCHES, WIDTH_INCHES * float(height / width) + 0.54 + 0.14 * rows
+        )
         axes = figure.subplots()
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
         if view.downward:
             axes.invert_yaxis()
         axes.set(xlabel=view.labels[0], ylabel=view.labels[1])
         axes.grid(alpha=0.25, linewidth=0.4)
+        say_frame(axes, "from above, in the world of the odometry" if truth is None else IN_TRUTH)
         if truth is not None:
             axes.plot(*_true_path(view, truth).T, gid="truth", **_TRUE_PATH)
         axes.plot(*view.points(odometry[:, :3]).T, gid="odometry", **_ODOMETRY_PATH)
@@ -91,19 +98,19 @@ def draw_results_map(results: Results, truth: MapTruth | None = None) -> "Figure
         _draw_pose_ellipses(axes, view, results, estimate, move.scale)
         for one in true_outlines:
             axes.fill(*one, facecolor=TRUTH, alpha=0.35, linewidth=0, zorder=1.5)
-        _draw_objects(axes, view, results.objects, move, outlines, styles)
-        _draw_legend(figure, styles, results, truth)
+        _draw_objects(axes, view, results.objects, move, outlines, colors)
+        _draw_legend(figure, entries)
         place_labels(
             axes,
             outlines,
             _names(results.objects),
-            [styles[name]["color"] for name in results.objects.class_names],
+            colors,
             size=6.0 if len(outlines) <= _NAMED_BY_CLASS else 5.0,
         )
     return figure
 
 
-def _window(paths: list[Floats], others: list[Floats]) -> tuple[Floats, Floats]:
+def window(paths: list[Floats], others: list[Floats]) -> tuple[Floats, Floats]:
     """Return the corners (2,) of the window, with the paths and everything near them."""
     every = np.vstack(paths)
     low, high = every.min(axis=0), every.max(axis=0)
@@ -170,7 +177,7 @@ def _draw_pose_ellipses(
             *view.outline(estimate[row, :3], spread),
             color=ESTIMATE,
             linewidth=0.5,
-            alpha=0.9,
+            linestyle=":",
             gid="pose covariance",
         )
 
@@ -181,15 +188,15 @@ def _draw_objects(
     objects: MapObjects,
     move: Alignment,
     outlines: list[Floats],
-    styles: dict[str, dict[str, Any]],
+    colors: list[str],
 ) -> None:
     for row, one in enumerate(outlines):
-        style = styles[objects.class_names[row]]
+        color = colors[row]
         if one.shape[1] == 1:
-            axes.plot(*one, "x", color=style["color"], markersize=4, gid="object")
+            axes.plot(*one, "x", color=color, markersize=4, gid="object")
             continue
-        axes.fill(*one, facecolor=style["color"], alpha=0.25, linewidth=0, zorder=2.5)
-        axes.plot(*one, linewidth=0.9, zorder=2.6, gid="object", **style)
+        axes.fill(*one, facecolor=color, alpha=0.25, linewidth=0, zorder=2.5)
+        axes.plot(*one, color=color, linewidth=0.9, zorder=2.6, gid="object")
         covariance = objects.center_covariances[row]
         if np.isfinite(covariance).all():
             turned = _SIGMAS**2 * move.scale**2 * move.rotation @ covariance @ move.rotation.T
@@ -205,41 +212,43 @@ def _draw_objects(
             )
 
 
-def _draw_legend(
-    figure: "Figure",
-    styles: dict[str, dict[str, Any]],
-    results: Results,
-    truth: MapTruth | None,
-) -> None:
+def _legend_entries(results: Results, truth: MapTruth | None) -> list[Any]:
+    """Return what the legend explains: paths and marks that are drawn, then the classes."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    handles: list[Any] = [
-        Line2D([], [], **_ODOMETRY_PATH),
-        Line2D([], [], **_ESTIMATED_PATH),
-    ]
+    objects = results.objects
+    entries: list[Any] = [Line2D([], [], **_ODOMETRY_PATH), Line2D([], [], **_ESTIMATED_PATH)]
     if truth is not None:
-        handles.append(Line2D([], [], **_TRUE_PATH))
-    spread = (
+        entries.append(Line2D([], [], **_TRUE_PATH))
+    entries.append(Line2D([], [], color="black", marker="o", markersize=2.5, lw=0, label="start"))
+    if (
         np.isfinite(results.covariances).any()
         or np.isfinite(results.objects.center_covariances).any()
-    )
-    if spread:
-        dots = Line2D([], [], color="0.2", linewidth=0.6, linestyle=":", label="2σ")
-        handles.append(dots)
-    blank = Line2D([], [], linewidth=0.0, label=" ")
-    handles += [blank] * (_LEGEND_COLUMNS - len(handles))
-    handles += [
-        Patch(
-            facecolor=(str(style["color"]), 0.25),
-            edgecolor=str(style["color"]),
-            linestyle=style["linestyle"],
-            label=shown_name(name),
-        )
-        for name, style in styles.items()
+    ):
+        entries.append(Line2D([], [], color="0.2", linewidth=0.6, linestyle=":", label="2σ"))
+    if truth is not None and truth.objects is not None and truth.objects.size is not None:
+        entries.append(Patch(facecolor=TRUTH, alpha=0.35, linewidth=0, label="true object"))
+    if not objects.is_ellipsoid.all():
+        cross = Line2D([], [], color="0.2", marker="x", markersize=4, lw=0, label="no ellipsoid")
+        entries.append(cross)
+    colors = class_colors(objects.class_names)
+    if is_colored_by_object(objects.class_names):
+        colors = dict.fromkeys(colors, GRAY)  # each object has a color of its own
+    entries += [
+        Patch(facecolor=(color, 0.25), edgecolor=color, label=shown_name(name))
+        for name, color in colors.items()
     ]
-    handles += [blank] * (-len(handles) % _LEGEND_COLUMNS)
-    by_column = [one for at in range(_LEGEND_COLUMNS) for one in handles[at::_LEGEND_COLUMNS]]
+    return entries
+
+
+def _draw_legend(figure: "Figure", entries: list[Any]) -> None:
+    """Draw the legend below, in rows."""
+    from matplotlib.lines import Line2D
+
+    blank = Line2D([], [], linewidth=0.0, label=" ")
+    filled = entries + [blank] * (-len(entries) % _LEGEND_COLUMNS)
+    by_column = [one for at in range(_LEGEND_COLUMNS) for one in filled[at::_LEGEND_COLUMNS]]
     figure.legend(
         handles=by_column,
         loc="outside lower center",

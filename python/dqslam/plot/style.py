@@ -2,10 +2,9 @@
 
 import contextlib
 import warnings
-from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from dqslam._colors import BLUE as BLUE
 from dqslam._colors import ESTIMATE as ESTIMATE
@@ -23,11 +22,8 @@ from dqslam._repr import printable
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-# Colors of classes; the first ones are not used for paths.
-_CLASS_COLORS = (PURPLE, ORANGE, SKY, GREEN, BLUE, VERMILLION, YELLOW)
-_CLASS_LINES = ("-", (0, (4, 1)), (0, (1.5, 0.8)))
 
 COLUMN_INCHES = 3.3
 FORMATS = ("svg", "png", "pdf")
@@ -73,25 +69,15 @@ def new_figure(width: float, height: float) -> "Figure":
     return figure
 
 
-def class_styles(class_names: Iterable[str]) -> dict[str, dict[str, Any]]:
-    """Return the color and line style of each class, frequent classes first.
-
-    ``class_names`` has the class of each object.
-    """
-    styles: dict[str, dict[str, Any]] = {}
-    for place, (name, _) in enumerate(Counter(class_names).most_common()):
-        turn, color = divmod(place, len(_CLASS_COLORS))
-        styles[name] = {
-            "color": _CLASS_COLORS[color],
-            "linestyle": _CLASS_LINES[turn % len(_CLASS_LINES)],
-        }
-    return styles
-
-
 def shown_name(name: str) -> str:
     """Return the name of a class as a label: Matplotlib leaves out those that begin with "_"."""
     shown = printable(name)
     return f" {shown}" if shown.startswith("_") else shown
+
+
+def say_frame(axes: "Axes", text: str) -> None:
+    """Say above a figure in which frame it is."""
+    axes.set_title(text, loc="left", pad=2.0, fontsize=6.5, color="0.3")
 
 
 def legend_above(figure: "Figure", handles: "Sequence[Artist]") -> None:

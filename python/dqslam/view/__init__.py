@@ -1,5 +1,7 @@
 """The scene of ``dqslam view``, on a live page, on a static page, or as a Rerun file."""
 
+from dqslam.view.foxglove import serve_foxglove as serve_foxglove
+from dqslam.view.foxglove import write_mcap as write_mcap
 from dqslam.view.live import serve as serve
 from dqslam.view.page import write_page as write_page
 from dqslam.view.rerun import write_rerun as write_rerun

@@ -25,7 +25,9 @@ def overview(results: Results, evaluation: Mapping[str, Any]) -> Numbers:
         ("objects", f"{len(results.objects)} mapped, {len(results.objects.dropped)} not"),
     ]
     if results.boxes is not None:
-        shown.append(("boxes", str(len(results.boxes))))
+        held_out = int(results.boxes.held_out.sum())
+        apart = f", {held_out} of them held out" if held_out else ""
+        shown.append(("boxes", f"{len(results.boxes)}{apart}"))
     if not evaluation:
         return tuple(shown)
     shown += [

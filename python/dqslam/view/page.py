@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -40,12 +41,17 @@ def write_page(scene: Scene, directory: str | Path) -> Path:
     return directory / "index.html"
 
 
-def write_page_files(scene: Scene, folder: Path) -> None:
-    """Write the page into a folder that has none."""
+def write_page_files(
+    scene: Scene, folder: Path, *, images: Sequence[str | None] | None = None
+) -> None:
+    """Write the page into a folder that has none.
+
+    ``images`` has the name of the photograph of each pose, in the folder of ``photographs``.
+    """
     for source in sorted(_STATIC.iterdir()):
         shutil.copyfile(source, folder / source.name)
     # A script, not JSON, because a browser that opens the folder itself may not fetch files.
-    text = json.dumps(_describe(scene), separators=(",", ":"), allow_nan=False)
+    text = json.dumps(_describe(scene) | {"images": images}, separators=(",", ":"), allow_nan=False)
     write_text(folder / "scene.js", f"const scene = {text};\n")
 
 
@@ -87,6 +93,7 @@ def _object(one: SceneObject) -> dict[str, Any]:
         "orientation": None if one.orientation_xyzw is None else _rounded(one.orientation_xyzw),
         "spread": None if spread is None else _spread(spread),
         "numbers": one.numbers,
+        "chiSquare": None if one.chi_square is None else round(one.chi_square, 3),
     }
 
 

@@ -15,14 +15,12 @@ import numpy as np
 
 from dqslam import _core
 from dqslam._checks import Floats, Ints
-from dqslam._colors import ORANGE, PURPLE, SKY, TRUTH
-from dqslam.evaluation import common_poses, evaluate_results
+from dqslam._colors import TRUTH, class_colors, object_colors
+from dqslam.evaluation import common_poses, evaluate_results, fit_boxes
 from dqslam.io import BoxTable, MapObjects, Results, Trajectory, TrueObjects
 from dqslam.metrics import Align, Alignment, up_direction
 from dqslam.view.numbers import Numbers, object_numbers, overview, true_object_numbers
 
-# Colors that no path has, then further colors from Tol's palette.
-CLASSES = (ORANGE, SKY, PURPLE, "#882255", "#999933", "#332288", "#44AA99", "#AA4499")
 # The true path has a gap if its poses are further apart than this multiple of the usual distance.
 GAP = 5.0
 # Number of standard deviations of the ellipsoids of uncertainty.
@@ -63,6 +61,8 @@ class SceneObject:
     """Square meters, shape (3, 3); None if unknown."""
     numbers: Numbers
     """Its properties as text."""
+    chi_square: float | None = None
+    """Median chi-square of its boxes that no border cuts, 3.36 is usual; None without any."""
 
     @property
     def ellipsoid(self) -> Floats | None:
@@ -169,7 +169,8 @@ def build_scene(
     evaluation: dict[str, Any] = {}
     truth: tuple[Floats, ...] = ()
     true_objects: tuple[SceneObject, ...] = ()
-    colors = _class_colors(results.objects, objects)
+    true_names = () if objects is None else objects.class_name or ()
+    colors = class_colors(results.objects.class_names, true_names)
     if groundtruth is not None:
         evaluation = evaluate_results(results, groundtruth, align=align, objects=objects)
         estimated_from_true = _inverse(evaluation["true_from_estimated"])
@@ -228,21 +229,13 @@ def _inverse(true_from_estimated: Mapping[str, Any]) -> Alignment:
     return Alignment(rotation, -rotation @ true_from_estimated["translation"] / scale, 1.0 / scale)
 
 
-def _class_colors(mapped: MapObjects, true: TrueObjects | None) -> dict[str, str]:
-    """Return the color of each class, classes of the map first; colors repeat if they run out."""
-    names = sorted(set(mapped.class_names))
-    names += sorted(set(true.class_name or () if true else ()) - set(names))
-    return {name: CLASSES[k % len(CLASSES)] for k, name in enumerate(names)}
-
-
 def _mapped_objects(
-    results: Results, evaluation: Mapping[str, Any], colors: Mapping[str, str]
+    results: Results, evaluation: Mapping[str, Any], colors: dict[str, str]
 ) -> tuple[SceneObject, ...]:
     mapped = results.objects
     numbers = object_numbers(results, evaluation)
-    of_object = [colors[name] for name in mapped.class_names]
-    if len(set(mapped.class_names)) == 1:
-        of_object = [CLASSES[row % len(CLASSES)] for row in range(len(mapped))]
+    chi_squares = _chi_squares(results)
+    of_object = object_colors(mapped.class_names, colors)
     return tuple(
         SceneObject(
             id=int(mapped.object_ids[row]),
@@ -253,9 +246,23 @@ def _mapped_objects(
             orientation_xyzw=_known(mapped.orientations[row]),
             center_covariance=_known(mapped.center_covariances[row]),
             numbers=numbers[row],
+            chi_square=chi_squares[row],
         )
         for row in range(len(mapped))
     )
+
+
+def _chi_squares(results: Results) -> list[float | None]:
+    """Return the median chi-square of the boxes of each object that were used."""
+    medians: list[float | None] = [None] * len(results.objects)
+    if results.boxes is None:
+        return medians
+    fits = fit_boxes(results)
+    counts = np.isfinite(fits.chi2) & ~results.boxes.held_out
+    for row in np.unique(fits.object_row[counts]).tolist():
+        if row >= 0:
+            medians[row] = float(np.median(fits.chi2[counts & (fits.object_row == row)]))
+    return medians
 
 
 def _true_objects(

@@ -8,10 +8,27 @@ class ImageView {
     canvas.style.aspectRatio = `${scene.camera.width} / ${scene.camera.height}`;
     canvas.addEventListener("click", (event) => onPick(this.pick(event.offsetX, event.offsetY)));
     this.outlines = [];
+    this.photographs = new Map();
   }
 
-  /** Draw an image; returns how many boxes, and how many objects are in it. */
-  draw(frame, selected) {
+  /** The photograph of an image, null if there is none or it is still loading. */
+  photograph(frame, onLoad) {
+    const name = this.scene.images?.[frame];
+    if (!name) return null;
+    if (!this.photographs.has(frame)) {
+      if (this.photographs.size > 60) this.photographs.clear();
+      const photograph = new Image();
+      photograph.onload = onLoad;
+      photograph.src = `images/${name}`;
+      this.photographs.set(frame, photograph);
+    }
+    const found = this.photographs.get(frame);
+    return found.complete && found.naturalWidth ? found : null;
+  }
+
+  /** Draw an image; returns how many boxes it has, of them held out, and how many objects. */
+  draw(frame, selected, { colorOf, hidden, onLoad }) {
+    this.colorOf = colorOf;
     const { camera, boxes } = this.scene;
     const ratio = window.devicePixelRatio || 1;
     this.scale = this.canvas.clientWidth / camera.width;
@@ -21,14 +38,17 @@ class ImageView {
     // Whole numbers are centers of pixels, hence the border is half a pixel before them.
     context.setTransform(ratio * this.scale, 0, 0, ratio * this.scale,
       ratio * this.scale / 2, ratio * this.scale / 2);
-    const rows = this.boxesOf[frame];
+    const photograph = this.photograph(frame, onLoad);
+    if (photograph) context.drawImage(photograph, -0.5, -0.5, camera.width, camera.height);
+    const rows = this.boxesOf[frame].filter((row) => !hidden.has(boxes.className[row]));
     const seen = new Set(rows.map((row) => boxes.object[row]));
-    this.outlines = this.outlinesIn(frame);
+    this.outlines = this.outlinesIn(frame).filter(({ row }) => !hidden.has(this.scene.objects[row].className));
     for (const { row, outline } of this.outlines) {
-      this.drawOutline(context, outline, this.scene.objects[row].color, seen.has(row), row === selected);
+      this.drawOutline(context, outline, colorOf(row), seen.has(row), row === selected);
     }
     for (const row of rows) this.drawBox(context, row, selected);
-    return { boxes: rows.length, outlines: this.outlines.length };
+    const heldOut = rows.filter((row) => boxes.state[row] === "held out").length;
+    return { boxes: rows.length, heldOut, outlines: this.outlines.length, photograph: Boolean(photograph) };
   }
 
   /** Outlines of all objects that are in front of the camera and meet the image. */
@@ -61,14 +81,14 @@ class ImageView {
   }
 
   drawBox(context, row, selected) {
-    const { boxes, objects } = this.scene;
+    const { boxes } = this.scene;
     const [left, top, right, bottom] = boxes.box[row];
     const object = boxes.object[row], state = boxes.state[row];
     const pixel = 1 / this.scale;
     const dashes = { fits: [], misfit: [6, 4], "held out": [1.5, 3], "left out": [] };
     context.setLineDash(dashes[state].map((dash) => dash * pixel));
     context.lineWidth = (state === "left out" ? 0.8 : object === selected && object >= 0 ? 3 : 1.8) * pixel;
-    context.strokeStyle = object >= 0 ? objects[object].color : "#999";
+    context.strokeStyle = object >= 0 ? this.colorOf(object) : "#999";
     context.strokeRect(left, top, right - left, bottom - top);
     context.setLineDash([]);
     context.font = `${10 * pixel}px system-ui, sans-serif`;

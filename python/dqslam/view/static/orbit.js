@@ -22,8 +22,8 @@ class Orbit {
   /** Stand where all points are seen, looking across the longest way they go. */
   frame(points) {
     const level = points.map(this.level);
-    const low = [0, 1, 2].map((k) => Math.min(...level.map((p) => p[k])));
-    const high = [0, 1, 2].map((k) => Math.max(...level.map((p) => p[k])));
+    const low = [0, 1, 2].map((k) => level.reduce((least, p) => Math.min(least, p[k]), Infinity));
+    const high = [0, 1, 2].map((k) => level.reduce((most, p) => Math.max(most, p[k]), -Infinity));
     const middle = [0, 1, 2].map((k) => (low[k] + high[k]) / 2);
     this.radius = Math.max(Math.hypot(...[0, 1, 2].map((k) => high[k] - low[k])) / 2, 1e-3);
     let [xx, xy, yy] = [0, 0, 0];
@@ -73,9 +73,28 @@ class Orbit {
     this.onChange();
   }
 
-  zoom(factor) {
-    this.distance = Math.min(50 * this.radius, Math.max(0.02 * this.radius, this.distance * factor));
+  /** Come nearer or go away; what is at a place of the canvas, CSS pixels, stays there. */
+  zoom(factor, x = this.canvas.clientWidth / 2, y = this.canvas.clientHeight / 2) {
+    const { view, lens } = this.look();
+    const before = this.distance;
+    this.distance = Math.min(50 * this.radius, Math.max(0.002 * this.radius, before * factor));
+    const meters = (before - this.distance) / lens.fx;
+    this.target = geometry.add(this.target, geometry.add(
+      geometry.scale((x - lens.cx) * meters, view.axes[0]), geometry.scale((y - lens.cy) * meters, view.axes[1])));
     this.onChange();
+  }
+
+  /** Move to a point within 0.4 s, and look at it from a distance, meters. */
+  fly(point, distance) {
+    const from = { target: this.target, distance: this.distance }, start = performance.now();
+    const step = (now) => {
+      const share = Math.min(1, (now - start) / 400), eased = share * share * (3 - 2 * share);
+      this.target = geometry.add(from.target, geometry.scale(eased, geometry.subtract(point, from.target)));
+      this.distance = from.distance * (distance / from.distance) ** eased;
+      this.onChange();
+      if (share < 1) requestAnimationFrame(step);
+    };
+    requestAnimationFrame(step);
   }
 
   listen() {
@@ -83,7 +102,8 @@ class Orbit {
     canvas.addEventListener("contextmenu", (event) => event.preventDefault());
     canvas.addEventListener("wheel", (event) => {
       event.preventDefault();
-      this.zoom(Math.exp(0.0012 * event.deltaY * (event.deltaMode === 1 ? 30 : 1)));
+      const factor = Math.exp(0.0012 * event.deltaY * (event.deltaMode === 1 ? 30 : 1));
+      this.zoom(factor, event.offsetX, event.offsetY);
     }, { passive: false });
     canvas.addEventListener("pointerdown", (event) => {
       canvas.setPointerCapture(event.pointerId);

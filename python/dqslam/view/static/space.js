@@ -4,6 +4,8 @@
 
 const CIRCLE = Array.from({ length: 49 }, (_, k) => [Math.cos(k * Math.PI / 24), Math.sin(k * Math.PI / 24)]);
 
+const MOST_DETAILED = 200; // objects with light and rings
+
 class SpaceView {
   /**
    * `shapes` and `trueShapes` are those of the objects, null where one is no ellipsoid; `boxesOf`
@@ -13,16 +15,19 @@ class SpaceView {
     Object.assign(this, { canvas, scene, shapes, trueShapes, boxesOf });
     this.drawn = [];
     const path = scene.estimate.map((pose) => pose.slice(0, 3));
-    this.orbit = new Orbit(canvas, scene.up, [...path, ...this.near(path)], onChange);
+    this.everything = [...path, ...this.near(path)];
+    this.orbit = new Orbit(canvas, scene.up, this.everything, onChange);
     this.ground = this.findGround(path);
     const places = (poses) => poses.map((pose) => pose.slice(0, 3));
     this.paths = { odometry: [places(scene.odometry)], truth: scene.truth.map(places), estimate: [path] };
+    for (const [name, runs] of Object.entries(this.paths)) this.paths[name] = runs.map((run) => new PathPieces(run));
     let down = [0, 0];
     canvas.addEventListener("pointerdown", (event) => { down = [event.offsetX, event.offsetY]; });
     canvas.addEventListener("click", (event) => {
       const moved = Math.hypot(event.offsetX - down[0], event.offsetY - down[1]);
-      if (moved < 4) onPick(this.pick(event.offsetX, event.offsetY));
+      if (moved < 4) onPick(this.pick(event.offsetX, event.offsetY), [event.offsetX, event.offsetY]);
     });
+    canvas.addEventListener("dblclick", (event) => this.flyTo(this.pick(event.offsetX, event.offsetY).mapped));
   }
 
   /** Centers of the objects, without those so far off that the rest would be a dot. */
@@ -31,7 +36,7 @@ class SpaceView {
     const away = (point) => geometry.length(geometry.subtract(point, middle));
     const centers = this.scene.objects.map((object) => object.center);
     const usual = centers.map(away).sort((a, b) => a - b)[Math.floor(centers.length / 2)];
-    const most = 3 * Math.max(usual || 0, ...path.map(away));
+    const most = 3 * path.reduce((largest, point) => Math.max(largest, away(point)), usual || 0);
     return centers.filter((center) => away(center) < most);
   }
 
@@ -44,15 +49,39 @@ class SpaceView {
       return [geometry.dot(object.center, up) - Math.sqrt(below)];
     }).sort((a, b) => a - b);
     if (bottoms.length) return bottoms[Math.floor(bottoms.length / 10)];
-    return Math.min(...path.map((point) => geometry.dot(point, up)));
+    return path.reduce((least, point) => Math.min(least, geometry.dot(point, up)), Infinity);
+  }
+
+  /** Stand again where all is seen. */
+  fit() {
+    this.orbit.frame(this.everything);
+    this.orbit.onChange();
+  }
+
+  /** Fly to an object by its row. */
+  flyTo(row) {
+    if (row === undefined) return;
+    const { center, semiAxes } = this.scene.objects[row];
+    this.orbit.fly(center, 12 * Math.max(...(semiAxes || [0.01 * this.orbit.radius])));
+  }
+
+  /** Where a place of the canvas is on the ground, null if that is beyond the horizon. */
+  onGround(x, y) {
+    const { view, lens } = this.orbit.look();
+    const ray = geometry.subtract(geometry.toWorld(view, [(x - lens.cx) / lens.fx, (y - lens.cy) / lens.fy, 1]), view.center);
+    const { up } = this.scene;
+    const far = (this.ground - geometry.dot(view.center, up)) / geometry.dot(ray, up);
+    return far > 0 ? geometry.add(view.center, geometry.scale(far, ray)) : null;
   }
 
   /** Draw what the switches ask for; returns how much of each is on the canvas. */
-  draw(shown, frame, selected) {
+  draw(shown, frame, selected, { colorOf, hidden, measure }) {
+    Object.assign(this, { colorOf, hidden });
     const ratio = window.devicePixelRatio || 1;
     this.canvas.width = Math.round(this.canvas.clientWidth * ratio);
     this.canvas.height = Math.round(this.canvas.clientHeight * ratio);
-    this.context = this.canvas.getContext("2d");
+    // Painted by the processor: ten thousand small shapes are slower on most graphics cards.
+    this.context = this.canvas.getContext("2d", { willReadFrequently: true });
     this.context.scale(ratio, ratio);
     this.context.lineJoin = "round";
     this.eye = this.orbit.look();
@@ -68,8 +97,12 @@ class SpaceView {
     if (shown.covariance) this.scene.poseSpreads.forEach((spread) => this.addSpread(items, spread));
     if (shown.truth) this.scene.trueObjects.forEach((_, row) => this.addTrue(items, row, selected));
     this.scene.objects.forEach((_, row) => this.addObject(items, row, shown, selected));
+    // Light and rings only where there is room to see them, and for the largest on the canvas.
+    const sizes = this.drawn.map(({ outline }) => outline.long).sort((a, b) => b - a);
+    this.detailed = Math.max(8, sizes[MOST_DETAILED] || 0);
     items.sort((a, b) => b.depth - a.depth).forEach((item) => item.draw());
-    if (shown.names) this.drawNames(selected);
+    if (shown.names) this.counts.labels = drawNames(this.context, this.drawn, selected);
+    measure.draw(this);
     return this.counts;
   }
 
@@ -110,26 +143,21 @@ class SpaceView {
     const count = 10, half = count * this.step;
     const e = Math.round(east / this.step) * this.step, n = Math.round(north / this.step) * this.step;
     for (let k = -count; k <= count; k += 1) {
-      const style = { strokeStyle: "#e3e6ea", lineWidth: 1 };
+      const style = { strokeStyle: theme.colors.grid, lineWidth: 1 };
       this.stroke([[e + k * this.step, n - half, this.ground], [e + k * this.step, n + half, this.ground]].map(orbit.world), style);
       this.stroke([[e - half, n + k * this.step, this.ground], [e + half, n + k * this.step, this.ground]].map(orbit.world), style);
     }
   }
 
-  /** A path in parts, so that each lies behind or before other things; what is to come is faint. */
-  addPath(items, name, points, frame) {
-    const size = Math.max(1, Math.ceil(points.length / 250));
-    const cuts = new Set([0, points.length - 1, Math.min(frame, points.length - 1)]);
-    for (let k = size; k < points.length; k += size) cuts.add(k);
-    const ends = [...cuts].sort((a, b) => a - b);
-    for (let k = 1; k < ends.length; k += 1) {
-      const part = points.slice(ends[k - 1], ends[k] + 1);
+  /** A path; what is to come is faint. */
+  addPath(items, name, pieces, frame) {
+    for (const { points, depth, isPast } of pieces.seen(this.eye, frame)) {
       const style = {
         strokeStyle: this.scene.colors[name], lineWidth: name === "truth" ? 4 : 2,
-        globalAlpha: name === "truth" ? 0.5 : ends[k] <= frame ? 0.95 : 0.35,
+        globalAlpha: name === "truth" ? 0.5 : isPast ? 0.95 : 0.35,
       };
-      this.counts[name] += part.length - 1;
-      items.push({ depth: this.depthOf(part[part.length >> 1]), draw: () => this.stroke(part, style) });
+      this.counts[name] += points.length - 1;
+      items.push({ depth, draw: () => this.stroke(points, style) });
     }
   }
 
@@ -137,14 +165,14 @@ class SpaceView {
     const { estimate } = this.scene;
     const size = 0.022 * this.orbit.radius;
     for (const k of this.scene.cameras) {
-      if (k !== frame) this.addCamera(items, estimate[k], size, { strokeStyle: "#7d8894", globalAlpha: 0.55 });
+      if (k !== frame) this.addCamera(items, estimate[k], size, { strokeStyle: theme.colors.camera, globalAlpha: 0.55 });
     }
-    this.addCamera(items, estimate[frame], 2.5 * size, { strokeStyle: "#111", lineWidth: 1.8 }, frame);
+    this.addCamera(items, estimate[frame], 2.5 * size, { strokeStyle: theme.colors["chosen-line"], lineWidth: 1.8 }, frame);
   }
 
   /** A pyramid from the camera to its image, which is `size` meters away; boxes on the current one. */
   addCamera(items, pose, size, style, frame = -1) {
-    const { camera, boxes, objects } = this.scene;
+    const { camera, boxes } = this.scene;
     const view = geometry.viewOf(pose);
     const at = (u, v) => geometry.toWorld(view,
       [size * (u - camera.cx) / camera.fx, size * (v - camera.cy) / camera.fy, size]);
@@ -156,7 +184,7 @@ class SpaceView {
       for (const corner of image.slice(0, 4)) this.stroke([view.center, corner], style);
       for (const row of frame < 0 ? [] : this.boxesOf[frame]) {
         if (boxes.object[row] < 0) continue;
-        const style = { strokeStyle: objects[boxes.object[row]].color, lineWidth: 1.5 };
+        const style = { strokeStyle: this.colorOf(boxes.object[row]), lineWidth: 1.5 };
         this.stroke(rectangle(...boxes.box[row]), style);
       }
     };
@@ -175,12 +203,14 @@ class SpaceView {
 
   addObject(items, row, shown, selected) {
     const object = this.scene.objects[row];
-    const isSelected = selected.mapped === row;
-    const style = { strokeStyle: isSelected ? "#111" : object.color, lineWidth: isSelected ? 2.6 : 1.2 };
+    if (this.hidden.has(object.className)) return;
+    const isSelected = selected.mapped === row, color = this.colorOf(row);
+    const style = { strokeStyle: isSelected ? theme.colors["chosen-line"] : color, lineWidth: isSelected ? 2.6 : 1.2 };
     if (shown.objects) {
       this.addOutline(items, object, this.shapes[row], { mapped: row }, (outline) => {
-        this.fill(outline, this.shade(outline, object.color), style);
-        this.drawRings(object);
+        const isDetailed = outline.long >= this.detailed;
+        this.fill(outline, isDetailed ? this.shade(outline, color) : color + "d0", isDetailed || isSelected ? style : null);
+        if (isDetailed) this.drawRings(object);
         this.counts.ellipsoids += 1;
       }, style);
     }
@@ -194,7 +224,7 @@ class SpaceView {
     if (!outline) return;
     // Before the object itself, which mostly is around it.
     items.push({ depth: outline.depth - 1e-6, draw: () => {
-      this.fill(outline, "#ffffff30", { strokeStyle: "#111", lineWidth: 1.2, setLineDash: [3, 2] });
+      this.fill(outline, "#ffffff30", { strokeStyle: theme.colors.text, lineWidth: 1.2, setLineDash: [3, 2] });
       this.counts.covariances += 1;
     } });
   }
@@ -203,6 +233,8 @@ class SpaceView {
   addOutline(items, object, shape, name, paint, style) {
     const { view, lens, near } = this.eye;
     const outline = shape && geometry.outlineOf(view, lens, object.center, shape);
+    if (outline && (Math.abs(outline.u - lens.cx) > lens.cx + outline.halfWidth
+      || Math.abs(outline.v - lens.cy) > lens.cy + outline.halfHeight)) return;
     if (outline) {
       this.drawn.push({ ...name, object, outline });
       items.push({ depth: outline.depth, draw: () => paint(outline) });
@@ -221,12 +253,24 @@ class SpaceView {
     }
   }
 
-  fill(outline, fill, { setLineDash = [], ...style }) {
-    Object.assign(this.context, style, { fillStyle: fill });
-    this.context.setLineDash(setLineDash);
+  /** A small disc at a place of the canvas. */
+  dot(u, v) {
+    this.context.fillStyle = theme.colors["chosen-line"];
+    this.context.beginPath();
+    this.context.arc(u, v, 4, 0, 2 * Math.PI);
+    this.context.fill();
+  }
+
+  /** Fill an outline, and draw its line in a style, null for none. */
+  fill(outline, fill, style) {
+    this.context.fillStyle = fill;
     this.context.beginPath();
     this.context.ellipse(outline.u, outline.v, outline.long, outline.short, outline.angle, 0, 2 * Math.PI);
     this.context.fill();
+    if (!style) return;
+    const { setLineDash = [], ...line } = style;
+    Object.assign(this.context, line);
+    this.context.setLineDash(setLineDash);
     this.context.stroke();
   }
 
@@ -244,7 +288,7 @@ class SpaceView {
   }
 
   /** The three rings of the principal axes, as far as they face the eye: they show how it is turned. */
-  drawRings({ center, semiAxes, orientation, color }) {
+  drawRings({ center, semiAxes, orientation }) {
     const axes = geometry.axesOf(orientation);
     const toEye = geometry.subtract(this.eye.view.center, center);
     for (const [i, j] of [[0, 1], [1, 2], [2, 0]]) {
@@ -260,29 +304,6 @@ class SpaceView {
         else flush();
       }
       flush();
-    }
-  }
-
-  /** Names above the objects; of two that would cover each other, only the nearer one's. */
-  drawNames(selected) {
-    const { context } = this;
-    const taken = [];
-    context.font = "12px system-ui, sans-serif";
-    context.textAlign = "center";
-    const order = this.drawn.filter((one) => one.mapped !== undefined)
-      .sort((a, b) => (b.mapped === selected.mapped) - (a.mapped === selected.mapped) || a.outline.depth - b.outline.depth);
-    for (const { object, outline } of order) {
-      const text = `${object.className} ${object.id}`;
-      const half = context.measureText(text).width / 2 + 2;
-      const x = outline.u, y = outline.v - outline.halfHeight - 5;
-      const place = [x - half, y - 12, x + half, y + 3];
-      if (taken.some((t) => place[0] < t[2] && place[2] > t[0] && place[1] < t[3] && place[3] > t[1])) continue;
-      taken.push(place);
-      Object.assign(context, { lineWidth: 3.5, strokeStyle: "#ffffffe0", fillStyle: "#1d2329" });
-      context.setLineDash([]);
-      context.strokeText(text, x, y);
-      context.fillText(text, x, y);
-      this.counts.labels += 1;
     }
   }
 

@@ -1,0 +1,27 @@
+// Names above the objects; of two that would cover each other, only the nearer one's.
+"use strict";
+
+const MOST_NAMES = 150;
+
+/** Write names of what was drawn, the selected one first; returns how many. */
+function drawNames(context, drawn, selected) {
+  const taken = [];
+  context.font = "12px system-ui, sans-serif";
+  context.textAlign = "center";
+  const order = drawn.filter((one) => one.mapped !== undefined)
+    .sort((a, b) => (b.mapped === selected.mapped) - (a.mapped === selected.mapped) || a.outline.depth - b.outline.depth);
+  for (const { object, outline } of order) {
+    if (taken.length === MOST_NAMES) break;
+    const text = `${object.className} ${object.id}`;
+    const half = context.measureText(text).width / 2 + 2;
+    const x = outline.u, y = outline.v - outline.halfHeight - 5;
+    const place = [x - half, y - 12, x + half, y + 3];
+    if (taken.some((t) => place[0] < t[2] && place[2] > t[0] && place[1] < t[3] && place[3] > t[1])) continue;
+    taken.push(place);
+    Object.assign(context, { lineWidth: 3.5, strokeStyle: theme.colors.halo, fillStyle: theme.colors.text });
+    context.setLineDash([]);
+    context.strokeText(text, x, y);
+    context.fillText(text, x, y);
+  }
+  return taken.length;
+}
