@@ -87,7 +87,7 @@ def test_options_of_a_look_stand_beside_it(settings, tmp_path, capsys):
 
 
 def test_paper_and_its_configuration(tmp_path, capsys):
-    options = ["--trials", "1", "--seed", "6", "--jobs", "1", "--shapes", "ellipsoids", "-q"]
+    options = ["--trials", "1", "--seed", "6", "--jobs", "1", "--objects", "ellipsoids", "-q"]
     assert main(["paper", *options, "--out", str(tmp_path / "a")]) == 0
     config = tmp_path / "a" / "config.toml"
     content = tomllib.loads(config.read_text())

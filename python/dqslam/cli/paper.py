@@ -60,7 +60,6 @@ def paper(
     objects: Annotated[
         Literal["cubes", "ellipsoids"] | None,
         typer.Option(
-            "--shapes",
             help="cubes, as in the paper; ellipsoids, without model error. Default: those of the "
             "scenario.",
         ),
@@ -92,7 +91,9 @@ def paper(
     wrong_association_kind: Annotated[
         Literal["random", "structured"],
         typer.Option(
-            "--wrong-kind", help="Wrong ids are those of any other object, or of the nearest one."
+            "--wrong-kind",
+            "--wrong-association-kind",
+            help="Wrong ids are those of any other object, or of the nearest one."
         ),
     ] = "random",
     loss: Annotated[
