@@ -112,7 +112,7 @@ def _require(is_good: bool, what: str) -> None:
 def readers(folder: Path) -> Iterator[Reader]:
     """Make a good file of every format in a folder, and yield its reader."""
     source = {kind: CORPUS / name for kind, name in SOURCES.items()}
-    context = ConvertContext(size=SIZE, frames=io.frame_rate(10.0))
+    context = ConvertContext(reading=io.ReadOptions(image_size=SIZE, frames=io.frame_rate(10.0)))
     for kind, formats in FORMATS.items():
         for format_ in formats:
             if format_.write is None:
