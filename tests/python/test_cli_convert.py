@@ -178,7 +178,7 @@ def test_bad_mounts(tmp_path, text, message):
         ),
         ("mot.txt out.csv --frame-rate 0", "frame rate is 0 Hz, not positive"),
         ("mot.txt out.csv --frame-rate 1 --frame-times x", "both give the times of frames"),
-        ("bad.csv out.json", "bad.csv:3: x1 is nan, not finite"),
+        ("bad.csv out.json", "bad.csv:3: x1 is not a finite number below"),
         ("empty.csv out.json", "empty.csv: is empty"),
         ("notes.md out.json", "notes.md: is in no known format; name it with --format"),
         ("void out.json", "void: is in no known format"),
