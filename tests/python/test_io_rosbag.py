@@ -259,3 +259,15 @@ def test_a_bag_of_ros_1(tmp_path):
     assert table.box.tolist() == [[80, 40, 120, 60]]
     assert (table.class_id.tolist(), table.track_id) == ([3], None)
     assert (read_camera(path).fx, read_camera(path).distortion[4]) == (500.5, 0.05)
+
+
+def test_an_error_of_the_library_is_one_line(tmp_path, bag):
+    """A definition of messages that is no definition is quoted in the error."""
+    folder = bag.write(tmp_path / "bag", {"/odom": [bag.odometry(*ODOMETRY[0])]}, StoragePlugin.MCAP)
+    (file,) = folder.glob("*.mcap")
+    content = file.read_bytes()
+    assert content.count(b"std_msgs/Header header") == 2
+    file.write_bytes(content.replace(b"std_msgs/Header header", b"std_msgs/Header\nheader"))
+    with pytest.raises(FileError, match="is no bag that can be read: ") as caught:
+        read_trajectory(file)
+    assert "\n" not in str(caught.value)

@@ -97,7 +97,9 @@ class BoxReading:
 def form_of(table: DetectionTable) -> str:
     """Return the form that the format of a file says, by the names of its columns."""
     columns = {plain(name) for name in table.columns}
-    if "cx" in columns or {"stamp", "bbox"} <= columns:  # YOLO, messages of ROS
+    if (
+        "cx" in {MEANING.get(name) for name in columns} or {"stamp", "bbox"} <= columns
+    ):  # YOLO, messages of ROS
         return "cxcywh"
     # A bbox of COCO, which has an image_id, is corner and size, and one of OA-SLAM two corners.
     of_oaslam = "bbox" in columns and "image_id" not in columns
