@@ -5,10 +5,10 @@ from pathlib import Path
 from typing import Any
 
 from rosbags.rosbag2 import StoragePlugin
-from test_io_rosbag import Bag
-from test_io_rosbag_frames import stamped, tf, transform
 
 from fuzz.readers import SEEDS
+from test_io_rosbag import Bag
+from test_io_rosbag_frames import stamped, tf, transform
 
 START = 1.7e9
 PATH = [(START, (0, 0, 0)), (START + 0.1, (0.1, 0, 0)), (START + 0.3, (0.2, 0, 0.1))]

@@ -65,3 +65,14 @@ def test_camera(tmp_path, large):
     (tmp_path / "c.json").write_text(text)
     with pytest.raises(io.FileError, match=r"c\.json:1: k1 is \S+, not a finite number below"):
         io.read_camera(tmp_path / "c.json")
+
+
+@pytest.mark.parametrize("large", LARGE)
+def test_formats_are_recognized_without_an_overflow(tmp_path, large):
+    """What may be a quaternion is not one of length 1."""
+    (tmp_path / "images.txt").write_text(f"1 {large} 0 0 0 0 0 0 1 a_000001.png\n\n")
+    with pytest.raises(io.FileError, match=r"images\.txt.*in no known format"):
+        io.read_trajectory(tmp_path / "images.txt")
+    (tmp_path / "m.txt").write_text(f"1,-1,1,1,{large},9,1,-1\n")
+    with pytest.raises(io.FileError, match=r"m\.txt:1: x2 is not a finite number below"):
+        io.read_detections(tmp_path / "m.txt", frames=io.frame_rate(1.0))

@@ -263,7 +263,9 @@ def test_a_bag_of_ros_1(tmp_path):
 
 def test_an_error_of_the_library_is_one_line(tmp_path, bag):
     """A definition of messages that is no definition is quoted in the error."""
-    folder = bag.write(tmp_path / "bag", {"/odom": [bag.odometry(*ODOMETRY[0])]}, StoragePlugin.MCAP)
+    folder = bag.write(
+        tmp_path / "bag", {"/odom": [bag.odometry(*ODOMETRY[0])]}, StoragePlugin.MCAP
+    )
     (file,) = folder.glob("*.mcap")
     content = file.read_bytes()
     assert content.count(b"std_msgs/Header header") == 2

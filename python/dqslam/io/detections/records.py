@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dqslam._checks import Bools, Floats, Ints
+from dqslam._checks import Floats, Ints
 from dqslam._limits import IN_REACH
 from dqslam.io.detections.classes import number_classes
 from dqslam.io.detections.table import NO_SCORE, DetectionTable
@@ -105,7 +105,7 @@ def _with_numbers(table: DetectionTable, context: ReadContext) -> DetectionTable
     """Leave out boxes whose corners, score or time are no finite numbers."""
     cells = np.column_stack([table.timestamp, table.box, table.score])
     good = ~np.isnan(in_reach(cells))
-    bad: Bools = ~good.all(axis=1)
+    bad = ~np.asarray(good.all(axis=1))
     names = ("timestamp", "x1", "y1", "x2", "y2", "score")
 
     def error(row: int) -> FileError:

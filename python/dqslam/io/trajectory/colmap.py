@@ -14,7 +14,7 @@ import numpy as np
 
 from dqslam import _core
 from dqslam._checks import Floats
-from dqslam.io.files import FileError, read_text
+from dqslam.io.files import FileError, in_reach, read_text
 from dqslam.io.formats import Format, Look, ReadContext
 from dqslam.io.image_names import ImageNameError, frames_of_images, have_times, image_name
 from dqslam.io.trajectory.table import (
@@ -78,7 +78,7 @@ def _is_image(fields: list[str]) -> bool:
     if len(fields[NAME].split()) > 1 and NUMBERS.fullmatch(fields[NAME]):
         return False  # a frame and a matrix of KITTI-360, not a turned camera
     try:
-        quaternion = [float(field) for field in fields[1:5]]
+        quaternion = in_reach(np.array(fields[1:5], dtype=float))
     except ValueError:
         return False
     return bool(abs(np.linalg.norm(quaternion) - 1) < NORM_TOLERANCE)

@@ -70,7 +70,7 @@ def _finite(
     """Return which poses are finite and have a rotation, and note the others."""
     cells = np.column_stack([times, poses])
     good = ~np.isnan(in_reach(cells))
-    finite: NDArray[np.bool_] = good.all(axis=1)
+    finite = np.asarray(good.all(axis=1))
     # Programs that lost track also write a quaternion of zeros.
     bad: NDArray[np.bool_] = ~finite | np.all(poses[:, 3:] == 0, axis=1)
 
