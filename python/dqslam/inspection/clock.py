@@ -16,7 +16,7 @@ from dqslam.inspection.evidence import Evidence, Finding, Floats, NotEnoughDataE
 from dqslam.inspection.windows import MOST_WINDOWS
 
 # Offsets that are tried: steps to each side.
-STEPS, FEW_STEPS = 12, 4
+STEPS, FEW_STEPS = 12, 8
 # An offset is sure if boxes miss less by this number of standard deviations, and if it is so many
 # of its own from zero. Smaller motions within it are no mistake [px].
 SURE_GAIN, SURE_OFFSET, LEAST_MOTION_PX = 2.0, 3.5, 2.5
@@ -65,8 +65,8 @@ def estimate_clock_offset(
     """Find the offset of the clocks at which boxes move most like the poses say.
 
     It is looked for within a number of steps, intervals of poses or half those of images, in at
-    most so many windows of a length, and between successive images. The surer of both estimates
-    counts.
+    most so many windows of a length, and between successive images. Of both estimates a sure one
+    counts, or else the one with the smaller spread.
 
     Raises
     ------
@@ -83,7 +83,7 @@ def estimate_clock_offset(
         found.append(_offset(step_costs(evidence, offsets), step, speed))
     if not found:
         raise NotEnoughDataError("too few boxes move from view to view")
-    return min(found, key=lambda one: one.sigma)
+    return min(found, key=lambda one: (not one.sure, one.sigma))
 
 
 def _offset(compared: TimeCosts, step: float, speed: float) -> ClockOffset:

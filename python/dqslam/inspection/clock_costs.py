@@ -22,6 +22,8 @@ from dqslam.recording.interpolation import interpolate_poses
 FEWEST_PARTS, PARTS = 8, 24
 # The least steps of the camera that are compared.
 FEWEST_COMPARED = 60
+# Errors of turns are taken for small [rad]: their squares are left out.
+LARGEST_TURN = 0.05
 # Parts of the time share the distances of objects, which are fitted at each offset anew. Over 30
 # simulated recordings of five kinds, the errors were 1.37 times what independent parts would have.
 WIDER = 1.4
@@ -55,7 +57,7 @@ def step_costs(evidence: Evidence, offsets: Floats) -> TimeCosts:
     Raises
     ------
     NotEnoughDataError
-        If boxes are seen in too few steps.
+        If boxes are seen in too few steps, or turns of the odometry are too noisy.
     """
     table, path = evidence.table, evidence.trajectory
     time, image = np.unique(table.timestamp, return_inverse=True)
@@ -74,6 +76,8 @@ def step_costs(evidence: Evidence, offsets: Floats) -> TimeCosts:
     fit = fit_steps(steps, *motions[given])
     costs = np.array([fit_steps(steps, *motion, fit).cost for motion in motions])[:, counted]
     best = int(np.argmin(costs.sum(axis=1)))
+    if fit.levels[0] > LARGEST_TURN:
+        raise NotEnoughDataError("the turns of the odometry are too noisy")
     if best != given:
         fit = fit_steps(steps, *motions[best])
         costs = np.array([fit_steps(steps, *motion, fit).cost for motion in motions])[:, counted]
