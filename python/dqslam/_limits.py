@@ -4,6 +4,9 @@ Beyond them, a number is in another unit or column, or a measurement has failed.
 of squares overflows and every file that is written can be read.
 """
 
+LARGEST_NUMBER = 1e40
+"""Of any number in a file, before it is known what it is: a covariance in micrometers has less."""
+IN_REACH = f"a finite number below {LARGEST_NUMBER:g}"
 LARGEST_COORDINATE_M = 1e8
 """No place on Earth is further from an origin, in any frame."""
 LARGEST_TIME_S = 1e11

@@ -1,6 +1,7 @@
 """Readers of every format of the registry, and of the other files: one clear error, or good data.
 
-A format that can be written joins by itself: its files are made from the corpus by `convert`.
+A format that can be written joins by itself: its files are made from the corpus by `convert`. Files
+as other programs write them, of every format, are in `corpus/formats`.
 """
 
 import random
@@ -8,6 +9,7 @@ import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -17,10 +19,12 @@ import dqslam as dq
 from dqslam import io
 from dqslam.io.convert import FORMATS, ConvertContext, convert
 from dqslam.io.formats import guarded
+from dqslam.io.rosbag import NAME as BAG
 from dqslam.simulation.scenario import load_scenario
 from fuzz.mutate import mutate_file
 
 CORPUS = Path(__file__).resolve().parents[1] / "corpus"
+SEEDS = CORPUS / "formats"
 SCENARIO = CORPUS.parents[1] / "data" / "scenarios" / "orbit.toml"
 SIZE = (640, 480)
 SOURCES = {"camera": "camera.json", "trajectory": "trajectory.txt", "detections": "boxes.csv"}
@@ -73,6 +77,8 @@ def read_trajectory(path: Path, format_: str | None = None) -> None:
 
 def read_detections(path: Path, format_: str | None = None) -> None:
     notes, frames = io.Notes(), io.frame_rate(10.0)
+    if path.name.startswith("minimal"):  # without numbers of frames
+        frames = None
     table = io.read_detections(
         path, format_, width=SIZE[0], height=SIZE[1], frames=frames, notes=notes
     )
@@ -112,7 +118,7 @@ def _require(is_good: bool, what: str) -> None:
 def readers(folder: Path) -> Iterator[Reader]:
     """Make a good file of every format in a folder, and yield its reader."""
     source = {kind: CORPUS / name for kind, name in SOURCES.items()}
-    context = ConvertContext(size=SIZE, frames=io.frame_rate(10.0))
+    context = ConvertContext(reading=io.ReadOptions(image_size=SIZE, frames=io.frame_rate(10.0)))
     for kind, formats in FORMATS.items():
         for format_ in formats:
             if format_.write is None:
@@ -123,6 +129,7 @@ def readers(folder: Path) -> Iterator[Reader]:
             yield Reader(f"{kind}/{format_.name}", path, READ[kind])
             named = partial(READ[kind], format_=format_.name)
             yield Reader(f"{kind}/{format_.name}, named", path, named)
+    yield from _seeds()
     yield Reader("results", CORPUS / "results", read_results)
     yield Reader("true objects", CORPUS / "objects.csv", io.read_true_objects)
     yield Reader("scenario", SCENARIO, lambda path: load_scenario(str(path)))
@@ -137,6 +144,17 @@ def readers(folder: Path) -> Iterator[Reader]:
         yield Reader(name, path, partial(_read_measured, read, times))
     for path in sorted(CORPUS.glob("found/*/*")):  # what was once read wrongly
         yield Reader(f"found/{path.parent.name}", path, READ[path.parent.name])
+
+
+def _seeds() -> Iterator[Reader]:
+    """Yield a reader of each file that another program could have written."""
+    for path in sorted(SEEDS.glob("*/*/*")):
+        kind, name = path.parts[-3], path.parts[-2]
+        if name == BAG and find_spec("rosbags") is None:
+            continue
+        yield Reader(f"{kind}/{name}/{path.name}", path, READ[kind])
+        named = partial(READ[kind], format_=name)
+        yield Reader(f"{kind}/{name}/{path.name}, named", path, named)
 
 
 def try_reader(reader: Reader, seed: str, folder: Path) -> None:
@@ -157,6 +175,8 @@ def try_reader(reader: Reader, seed: str, folder: Path) -> None:
         mutate_file(copied, rng)
         reader.read(copied)
     except ValueError as error:
+        if isinstance(error.__cause__, Warning):
+            raise Wrong(f"a number was not checked before it was used: {error}") from error
         if str(folder) not in str(error):
             raise Wrong(f"the error does not name the file: {error}") from error
         if "\n" in str(error) and not hasattr(error, "errors"):

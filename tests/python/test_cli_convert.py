@@ -7,6 +7,7 @@ from dqslam.cli import main
 from dqslam.io import (
     ConvertContext,
     FileError,
+    ReadOptions,
     convert,
     frame_rate,
     read_camera,
@@ -177,7 +178,7 @@ def test_bad_mounts(tmp_path, text, message):
         ),
         ("mot.txt out.csv --frame-rate 0", "frame rate is 0 Hz, not positive"),
         ("mot.txt out.csv --frame-rate 1 --frame-times x", "both give the times of frames"),
-        ("bad.csv out.json", "bad.csv:3: x1 is nan, not finite"),
+        ("bad.csv out.json", "bad.csv:3: x1 is not a finite number below"),
         ("empty.csv out.json", "empty.csv: is empty"),
         ("notes.md out.json", "notes.md: is in no known format; name it with --format"),
         ("void out.json", "void: is in no known format"),
@@ -233,7 +234,7 @@ def test_a_folder_tells_how_many_of_its_files_are_read(folder):
     for frame in range(4):
         (folder / "yolo" / f"{frame}.txt").write_text("0 0.5 0.5 0.1 0.1\n")
     shares = []
-    context = ConvertContext(size=(640, 480), frames=frame_rate(10.0))
+    context = ConvertContext(reading=ReadOptions(image_size=(640, 480), frames=frame_rate(10.0)))
     convert(folder / "yolo", folder / "o.csv", context=context, progress=shares.append)
     assert shares == [0.25, 0.5, 0.75, 1.0]
     shares.clear()
@@ -257,3 +258,23 @@ def test_one_of_several_cameras_is_converted_by_its_id(tmp_path, capsys):
     assert "holds 2 cameras, 1, 2: choose one with --camera-id" in capsys.readouterr().err
     assert main(["convert", source, out, "--to", "kalibr"]) == 2
     assert "--to: kalibr is read, not written" in capsys.readouterr().err
+
+
+def test_numbers_are_written_as_they_are_meant(folder, call):
+    """Millimeters and quaternions w first; corner and size in a square image with bars."""
+    rows = [line.split() for line in PATH.splitlines()]
+    w_first = [
+        [row[0], *(str(1000 * float(x)) for x in row[1:4]), row[7], *row[4:7]] for row in rows
+    ]
+    (folder / "mm.txt").write_text("".join(" ".join(row) + "\n" for row in w_first))
+    call("mm.txt m.txt --to tum --poses w_first --length-scale 0.001")
+    np.testing.assert_allclose(read_trajectory("m.txt")[1], read_trajectory("traj.txt")[1])
+    (folder / "square.csv").write_text("frame,timestamp,x1,y1,x2,y2\n0,1,99.5,179.5,100,120\n")
+    options = "--box-form xywh --box-image 640x640 --letterbox --time-offset -0.5"
+    call(f"square.csv b.csv --camera camera.json {options}")
+    table = read_detections("b.csv")
+    np.testing.assert_allclose(table.box, [[99.5, 99.5, 199.5, 219.5]])
+    assert table.timestamp.tolist() == [0.5]
+    assert "boxes of another image need the size of the camera's" in call(
+        f"square.csv c.csv {options}"
+    )

@@ -84,7 +84,7 @@ def test_another_camera_of_kitti_has_the_size_that_is_given(tmp_path):
         read_camera(path, camera_id="3")
     camera = read_camera(path, camera_id="3", image_size=(640, 480))
     assert numbers(camera) == (503, 500, 320, 240, 640, 480)
-    context = ConvertContext(size=(640, 480), camera_id="3")
+    context = ConvertContext(reading=ReadOptions(image_size=(640, 480), camera_id="3"))
     convert(path, tmp_path / "camera.json", context=context)
     assert numbers(read_camera(tmp_path / "camera.json")) == numbers(camera)
 
@@ -105,7 +105,7 @@ def test_a_recording_has_the_camera_of_an_id(files, tmp_path):
         load_recording(path, *files[1:])
     formats = split_formats(["kalibr"])
     recording, _ = load_recording(
-        path, *files[1:], formats=formats, reading=ReadOptions(camera_id="cam0")
+        path, *files[1:], reading=ReadOptions(formats=formats, camera_id="cam0")
     )
     assert recording.camera.fx == own.fx
 

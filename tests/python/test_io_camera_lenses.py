@@ -116,7 +116,7 @@ def test_models(tmp_path, changes, expected):
         ({"rectified": True, "D": FIVE}, r":8: rectified is true, but there is a lens: D"),
         ({"intrinsics": {"fx": 501.0}}, r":2: fx is given twice, as 500.5 and 501.0"),
         ({"image_width": 641}, r":8: width is 640 by width, but 641 by image_width"),
-        ({"fx": 10**400}, r":2: fx is inf, not finite"),
+        ({"fx": 10**400}, r":2: fx is inf, not a finite number below"),
         ({"K": [[1, 0, 320.25], [0, 501, 240], [0, 0, 1]]}, r"fx is 500.5 by fx, but 1 by K"),
         ({"cx": 1e5}, r":4: cx is 100000, far from an image with width 640"),
     ],

@@ -52,7 +52,7 @@ def test_what_is_written_is_read_back(tmp_path):
     [
         (["0", "0.1 a.png"], r"times\.txt:2: 2 fields, not time"),
         (["0 a b"], r"times\.txt:1: 3 fields"),
-        (["0", "# no", "nan"], r":3: timestamp is nan, not finite"),
+        (["0", "# no", "nan"], r":3: timestamp is nan, not a finite number below"),
         (["0", "one"], r":2: timestamp is 'one', not a number"),
         (
             ["0", "0.2", "0.1"],

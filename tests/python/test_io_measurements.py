@@ -54,7 +54,7 @@ CLOSURE = "from_pose,to_pose,x,y,z,qx,qy,qz,qw,sigma_translation,sigma_rotation\
         (read_positions, POSITION + "4,1,0,0,1,1\n", r":2: pose is 4, but there are 4 poses"),
         (read_positions, POSITION + "0,-1,0,0,1,1\n", r":2: object is -1, not an id"),
         (read_positions, POSITION + "0,1,0,0,1,0\n", r":2: sigma is 0, not positive"),
-        (read_positions, POSITION + "0,1,0,nan,1,1\n", r":2: y is nan, not finite"),
+        (read_positions, POSITION + "0,1,0,nan,1,1\n", r":2: y is nan, not a finite number below"),
         (
             read_absolute,
             "x,y,z,sigma\n1,2,3,1\n",

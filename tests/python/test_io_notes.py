@@ -23,7 +23,7 @@ def boxes(tmp_path, *bad, count=100):
     [
         ("10,1.0,50,20,50,90,0.9,0,cup", r"boxes\.csv:12: empty box 50, 20, 50, 90"),
         ("10,1.0,700,20,750,90,0.9,0,cup", r":12: box 700, 20, 750, 90 is outside the image"),
-        ("10,1.0,,20,50,90,0.9,0,cup", r":12: x1 is nan, not finite"),
+        ("10,1.0,,20,50,90,0.9,0,cup", r":12: x1 is not a finite number below"),
         ("10,1.0,5,20,50,90,7,0,cup", r":12: score is 7, not between 0 and 1"),
     ],
 )
@@ -70,7 +70,7 @@ def poses(tmp_path, *rows, count=40):
 @pytest.mark.parametrize(
     ("row", "message"),
     [
-        ("10 nan nan nan nan nan nan nan", r"path\.txt:11: tx is nan, not finite"),
+        ("10 nan nan nan nan nan nan nan", r"path\.txt:11: tx is not a finite number below"),
         ("10 1 1 1 0 0 0 0", r":11: quaternion has length 0"),
         ("9 9 0 0 0 0 0 1", r":11: time 9\.0 repeats 9\.0 \(line 10\)"),
     ],

@@ -66,6 +66,19 @@ def test_boxes_are_checked_as_they_are_meant(files):
         load_recording(*files)
 
 
+@pytest.mark.parametrize(
+    ("keywords", "message"),
+    [
+        ({"max_time_difference": -1.0}, "max_time_difference is -1, negative"),
+        ({"image_size": (0, 480)}, "image_size is 0 x 480, not positive"),
+        ({"max_bad": 1.5}, "max_bad is 1.5"),
+    ],
+)
+def test_options_that_make_no_sense(keywords, message):
+    with pytest.raises(ValueError, match=message):
+        ReadOptions(**keywords)
+
+
 def test_measurements_count_the_poses_of_the_file(files, tmp_path):
     """Images between poses add poses to the recording."""
     edit(files[2], lambda lines: [lines[0], *map(_later, lines[1:])])

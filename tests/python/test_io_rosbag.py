@@ -182,7 +182,7 @@ def test_what_is_wrong_is_named_with_its_message(tmp_path, bag):
     bad = bag.odometry(100.0, (1, float("nan"), 3), (0, 0, 0, 1))
     flat = (1.0, 1.0, 0.0, 1.0, (("cup", 0.5),), "")
     topics = {
-        "odometry": ([bag.odometry(*ODOMETRY[0]), bad], "bag:2: ty is nan, not finite"),
+        "odometry": ([bag.odometry(*ODOMETRY[0]), bad], "bag:2: ty is not a finite number below"),
         "backwards": ([bag.odometry(*row) for row in ODOMETRY[::-1]], "bag:2: time 100.25 goes ba"),
         "turned": ([bag.boxes(0, CUP, theta=0.1)], "/turned, message 1: box is turned by 0.1 rad"),
         "flat": ([bag.boxes(0, CUP), bag.boxes(1, flat)], "bag:2: empty box"),
@@ -259,3 +259,17 @@ def test_a_bag_of_ros_1(tmp_path):
     assert table.box.tolist() == [[80, 40, 120, 60]]
     assert (table.class_id.tolist(), table.track_id) == ([3], None)
     assert (read_camera(path).fx, read_camera(path).distortion[4]) == (500.5, 0.05)
+
+
+def test_an_error_of_the_library_is_one_line(tmp_path, bag):
+    """A definition of messages that is no definition is quoted in the error."""
+    folder = bag.write(
+        tmp_path / "bag", {"/odom": [bag.odometry(*ODOMETRY[0])]}, StoragePlugin.MCAP
+    )
+    (file,) = folder.glob("*.mcap")
+    content = file.read_bytes()
+    assert content.count(b"std_msgs/Header header") == 2
+    file.write_bytes(content.replace(b"std_msgs/Header header", b"std_msgs/Header\nheader"))
+    with pytest.raises(FileError, match="is no bag that can be read: ") as caught:
+        read_trajectory(file)
+    assert "\n" not in str(caught.value)

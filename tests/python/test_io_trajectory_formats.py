@@ -97,7 +97,7 @@ def test_matrices_come_back_to_a_billionth(tmp_path, name):
     ("text", "message"),
     [
         (KITTI + "1 2 3\n", r"traj\.txt:2: 3 fields, not the 12 of a 3 x 4 matrix"),
-        (KITTI + KITTI.replace("3", "nan"), r":2: tx is nan, not finite"),
+        (KITTI + KITTI.replace("3", "nan"), r":2: tx is not a finite number below"),
         (KITTI + KITTI.replace("-1", "1"), r":2: the 3 x 3 part is no rotation .*determinant -1"),
         (KITTI.replace("-1", "-1.1"), r":1: the 3 x 3 part is no rotation \(R R' differs .* 0\.21"),
         (

@@ -9,6 +9,7 @@ import numpy as np
 from dqslam import _core
 from dqslam._checks import Floats, Ints
 from dqslam._ids import ObservationRow, Tracklet
+from dqslam._limits import LARGEST_VARIANCE
 from dqslam.association.assignment import assign
 from dqslam.association.consistency import find_misfits, join_duplicates
 from dqslam.association.gating import CHI2_GATE, PredictedBoxes, in_image, pair_costs, predict_boxes
@@ -170,7 +171,7 @@ def _blur(recording: Recording, distance: float) -> float:
 
 def _depth_error(towards: Floats, covariance: Floats) -> float:
     """Return the relative standard deviation of a distance; infinite where it is unknown."""
-    if not np.isfinite(covariance).all():
+    if not np.all(np.abs(covariance) <= LARGEST_VARIANCE):
         return np.inf
     variance = float(towards @ covariance @ towards)
     return float(np.sqrt(max(variance, 0.0))) / float(towards @ towards)

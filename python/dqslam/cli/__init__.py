@@ -92,8 +92,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     with warnings.catch_warnings():
         warnings.simplefilter("always", ChangedFileWarning)
         warnings.simplefilter("always", InputWarning)
-        # A number that overflows is refused where it is checked: that says more than NumPy does.
-        warnings.simplefilter("ignore", RuntimeWarning)
         warnings.showwarning = _show_warning
         return _run(arguments)
 

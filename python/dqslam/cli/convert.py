@@ -1,30 +1,21 @@
 """``dqslam convert``: cameras, trajectories and detections from one format to another."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from dqslam._input import refuse_shared_input
-from dqslam.cli.options import (
-    CameraId,
-    CameraInBody,
-    FirstFrame,
-    FrameRate,
-    FrameTimesFile,
-    ImageSize,
-    MaxBad,
-    Nms,
-    Topics,
-    given_frame_times,
-    given_reading,
-    given_readings,
-)
+from dqslam.cli.groups import with_groups
 from dqslam.cli.output import Json, Output, Quiet
+from dqslam.cli.reading import ReadingOptions
 from dqslam.cli.settings import ConfigFile
 
 
+@with_groups
 def convert(
+    *,
     source: Annotated[
         Path, typer.Argument(metavar="IN", help="File, YOLO folder, bag, or directory of results.")
     ],
@@ -39,21 +30,13 @@ def convert(
     camera: Annotated[
         Path | None, typer.Option(help="Camera file with the image size, which YOLO boxes need.")
     ] = None,
-    camera_id: CameraId = None,
-    frame_times: FrameTimesFile = None,
-    frame_rate: FrameRate = None,
     classes: Annotated[
         Path | None,
         typer.Option(
             help="Names of classes: COCO JSON, data.yaml, or text with one name per line."
         ),
     ] = None,
-    camera_in_body: CameraInBody = None,
-    image_size: ImageSize = None,
-    first_frame: FirstFrame = None,
-    nms: Nms = None,
-    max_bad: MaxBad = 0.05,
-    topics: Topics = None,
+    how: ReadingOptions,
     odometry_covariance: Annotated[
         Path | None,
         typer.Option(help="CSV of the covariance of each step, for pose graphs of results."),
@@ -73,24 +56,17 @@ def convert(
     from dqslam import io
 
     output = Output(quiet=quiet, as_json=json)
-    inputs = (source, camera, frame_times, classes, camera_in_body)
+    inputs = (source, camera, classes, *how.files)
     refuse_shared_input(*inputs, odometry_covariance)
-    readings = given_readings(camera_in_body=camera_in_body)
-    reading = given_reading(first_frame, max_bad, nms, topics, image_size, readings=readings)
-    size = reading.image_size
+    reading = how.read_options()
     if camera is not None:
-        lens = io.read_camera(camera, camera_id=camera_id, image_size=size)
-        size = (lens.width, lens.height)
-    notes = io.Notes(max_bad=max_bad)
+        lens = io.read_camera_file(camera, reading)
+        reading = replace(reading, camera_id=None, image_size=(lens.width, lens.height))
+    notes = io.Notes(max_bad=reading.max_bad)
     context = io.ConvertContext(
-        size=size,
+        reading=reading,
         odometry_covariance=odometry_covariance,
-        camera_id=camera_id if camera is None else None,
-        frames=given_frame_times(frame_times, frame_rate),
-        first_frame=first_frame,
         classes=None if classes is None else io.read_class_names(classes),
-        body_from_camera=readings.body_from_camera,
-        nms=nms,
         notes=notes,
         files=tuple(one for one in inputs[1:] if one is not None),
     )
@@ -100,7 +76,6 @@ def convert(
             out,
             format=format_,
             to=to,
-            topics=topics or (),
             context=context,
             progress=progress,
         )

@@ -5,33 +5,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from dqslam._input import refuse_shared_input
-from dqslam.cli.options import (
-    BoxForm,
-    BoxImage,
-    CameraFile,
-    CameraId,
-    CameraInBody,
-    DetectionFile,
-    FirstFrame,
-    Formats,
-    FrameRate,
-    FrameTimesFile,
-    ImageSize,
-    LengthScale,
-    Letterbox,
-    MaxBad,
-    MaxTimeDifference,
-    Nms,
-    OdometryFile,
-    PosesAs,
-    TimeOffset,
-    TimeScale,
-    Topics,
-    given_frame_times,
-    given_reading,
-    given_readings,
-)
+from dqslam.cli.groups import with_groups
 from dqslam.cli.output import Json, Output, Quiet
+from dqslam.cli.reading import RecordingOptions
 from dqslam.cli.settings import ConfigFile
 
 if TYPE_CHECKING:
@@ -44,32 +20,13 @@ MOST_LISTED = 8
 FOUND = 3  # exit code of --strict
 
 
+@with_groups
 def inspect(
-    camera: CameraFile,
-    odometry: OdometryFile,
-    detections: DetectionFile,
-    camera_id: CameraId = None,
-    formats: Formats = None,
-    frame_times: FrameTimesFile = None,
-    frame_rate: FrameRate = None,
-    first_frame: FirstFrame = None,
-    image_size: ImageSize = None,
-    topics: Topics = None,
-    nms: Nms = None,
-    max_bad: MaxBad = 0.05,
+    files: RecordingOptions,
     ids: Annotated[
         Literal["track_id", "class_id"] | None,
         typer.Option(help="Column with the ids of objects. Default: boxes are linked by overlap."),
     ] = None,
-    max_time_difference: MaxTimeDifference = None,
-    poses: PosesAs = None,
-    camera_in_body: CameraInBody = None,
-    length_scale: LengthScale = 1.0,
-    box_form: BoxForm = None,
-    box_image: BoxImage = None,
-    letterbox: Letterbox = False,
-    time_offset: TimeOffset = 0.0,
-    time_scale: TimeScale = 1.0,
     strict: Annotated[
         bool,
         typer.Option(
@@ -88,37 +45,21 @@ def inspect(
     from dqslam import io
     from dqslam.inspection import inspect_recording
 
-    refuse_shared_input(camera, odometry, detections, frame_times, camera_in_body)
+    refuse_shared_input(*files.files)
     output = Output(quiet=quiet, as_json=json)
-    names = io.split_formats(formats or [])
+    camera, odometry, detections = files.camera, files.odometry, files.detections
     with output.steps("inspecting", 3) as done:
-        frames = given_frame_times(frame_times, frame_rate)
-        frames = frames or io.choose_frame_times(odometry, detections, names)
-        readings = given_readings(
-            poses=poses,
-            camera_in_body=camera_in_body,
-            length_scale=length_scale,
-            box_form=box_form,
-            box_image=box_image,
-            letterbox=letterbox,
-            time_offset=time_offset,
-            time_scale=time_scale,
-        )
-        reading = given_reading(
-            first_frame, max_bad, nms, topics, image_size, camera_id, readings=readings
-        )
+        reading = files.read_options().with_frame_times(odometry, detections)
         io.check_topics(camera, odometry, detections, reading)
-        notes = io.Notes(max_bad=max_bad)
-        lens = io.read_camera_file(camera, names, reading)
-        path = io.read_path_file(odometry, names, frames, reading, notes)
+        notes = io.Notes(max_bad=reading.max_bad)
+        lens = io.read_camera_file(camera, reading)
+        path = io.read_path_file(odometry, reading, notes)
         done()
-        table = io.read_boxes_file(
-            detections, lens, path, names, frames, reading, notes, check=False
-        )
+        size = (lens.width, lens.height)
+        table = io.read_boxes_file(detections, size, reading, notes, trajectory=path, check=False)
         done()
-        inspection = inspect_recording(
-            lens, path, table, ids=ids, max_time_difference=max_time_difference
-        )
+        latest = reading.max_time_difference
+        inspection = inspect_recording(lens, path, table, ids=ids, max_time_difference=latest)
     _show(output, inspection, notes)
     if strict and (inspection.findings or notes.has_bad):
         raise typer.Exit(FOUND)

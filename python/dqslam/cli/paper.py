@@ -93,7 +93,7 @@ def paper(
         typer.Option(
             "--wrong-kind",
             "--wrong-association-kind",
-            help="Wrong ids are those of any other object, or of the nearest one."
+            help="Wrong ids are those of any other object, or of the nearest one.",
         ),
     ] = "random",
     loss: Annotated[

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -11,37 +12,10 @@ import typer
 from dqslam._files import refuse_inputs
 from dqslam._input import refuse_shared_input
 from dqslam._outputs import check_output_set
-from dqslam.cli.options import (
-    AbsoluteFile,
-    BoxForm,
-    BoxImage,
-    CameraFile,
-    CameraId,
-    CameraInBody,
-    ClosuresFile,
-    DetectionFile,
-    FirstFrame,
-    Formats,
-    FrameRate,
-    FrameTimesFile,
-    ImageSize,
-    LengthScale,
-    Letterbox,
-    MaxBad,
-    MaxTimeDifference,
-    Nms,
-    OdometryFile,
-    PosesAs,
-    PositionsFile,
-    ResultDirectory,
-    TimeOffset,
-    TimeScale,
-    Topics,
-    given_frame_times,
-    given_reading,
-    given_readings,
-)
+from dqslam.cli.groups import with_groups
+from dqslam.cli.options import ResultDirectory
 from dqslam.cli.output import Json, Output, Quiet
+from dqslam.cli.reading import RecordingOptions
 from dqslam.cli.run_tables import show_report
 from dqslam.cli.settings import CONFIG, ConfigFile, settings_text
 
@@ -52,24 +26,14 @@ DOUBTFUL = 3  # exit code of a run whose result is doubtful
 NOISE = "translation=0.02, rotation=0.01"
 
 
+@with_groups
 def run(
     context: typer.Context,
-    camera: CameraFile,
-    odometry: OdometryFile,
-    detections: DetectionFile,
+    files: RecordingOptions,
     out: ResultDirectory,
     min_score: Annotated[
         float, typer.Option(help="Leave out boxes with a lower score, 0 to 1.")
     ] = 0.5,
-    camera_id: CameraId = None,
-    formats: Formats = None,
-    frame_times: FrameTimesFile = None,
-    frame_rate: FrameRate = None,
-    first_frame: FirstFrame = None,
-    image_size: ImageSize = None,
-    topics: Topics = None,
-    nms: Nms = None,
-    max_bad: MaxBad = 0.05,
     strict: Annotated[
         bool, typer.Option("--strict", help="Refuse any bad box or pose, as --max-bad 0 does.")
     ] = False,
@@ -118,9 +82,27 @@ def run(
             rich_help_panel="More measurements",
         ),
     ] = None,
-    positions: PositionsFile = None,
-    absolute: AbsoluteFile = None,
-    closures: ClosuresFile = None,
+    positions: Annotated[
+        Path | None,
+        typer.Option(
+            help="CSV of measured centers of objects in the camera frame, with final ids.",
+            rich_help_panel="More measurements",
+        ),
+    ] = None,
+    absolute: Annotated[
+        Path | None,
+        typer.Option(
+            help="CSV of positions of the camera in a frame of their own, like GPS.",
+            rich_help_panel="More measurements",
+        ),
+    ] = None,
+    closures: Annotated[
+        Path | None,
+        typer.Option(
+            help="CSV of relative poses of the camera: loop closures.",
+            rich_help_panel="More measurements",
+        ),
+    ] = None,
     groundtruth: Annotated[
         Path | None, typer.Option(help="TUM trajectory to compare with, in any world frame.")
     ] = None,
@@ -142,15 +124,6 @@ def run(
         bool,
         typer.Option("--online", help="Replay the recording step by step, and polish at the end."),
     ] = False,
-    max_time_difference: MaxTimeDifference = None,
-    poses: PosesAs = None,
-    camera_in_body: CameraInBody = None,
-    length_scale: LengthScale = 1.0,
-    box_form: BoxForm = None,
-    box_image: BoxImage = None,
-    letterbox: Letterbox = False,
-    time_offset: TimeOffset = 0.0,
-    time_scale: TimeScale = 1.0,
     mcap: Annotated[
         Path | None,
         typer.Option(metavar="FILE.mcap", help="Also write the result as MCAP, for Foxglove."),
@@ -175,8 +148,8 @@ def run(
     from dqslam.pipeline.files import WRITTEN_BY
 
     inputs = (
-        *(camera, odometry, detections, frame_times, camera_in_body, groundtruth, size_priors),
-        *(odometry_covariance, positions, absolute, closures),
+        *(*files.files, groundtruth, size_priors, odometry_covariance),
+        *(positions, absolute, closures),
     )
     refuse_shared_input(*inputs)
     check_output_set(out, WRITTEN_BY, inputs=inputs)
@@ -186,16 +159,7 @@ def run(
         raise ValueError("--odometry-covariance: another option gives the noise already")
     if online and mode == "mapping":
         raise ValueError("--online: cannot be combined with --mode mapping")
-    readings = given_readings(
-        poses=poses,
-        camera_in_body=camera_in_body,
-        length_scale=length_scale,
-        box_form=box_form,
-        box_image=box_image,
-        letterbox=letterbox,
-        time_offset=time_offset,
-        time_scale=time_scale,
-    )
+    reading = files.read_options()
     options = RunFilesOptions(
         ids=ids,
         trust_ids=trust_ids,
@@ -205,18 +169,7 @@ def run(
         seed=seed,
         min_score=min_score,
         extras=io.Extras(positions=positions, absolute=absolute, closures=closures),
-        formats=io.split_formats(formats or []),
-        frames=given_frame_times(frame_times, frame_rate),
-        reading=given_reading(
-            first_frame,
-            0.0 if strict else max_bad,
-            nms,
-            topics,
-            image_size,
-            camera_id,
-            readings=readings,
-        ),
-        max_time_difference=max_time_difference,
+        reading=replace(reading, max_bad=0.0) if strict else reading,
         force=force,
         added_noise=added,
         odometry_noise=believed,
@@ -233,9 +186,9 @@ def run(
     )
     with shown as show:
         result = run_files(
-            camera,
-            odometry,
-            detections,
+            files.camera,
+            files.odometry,
+            files.detections,
             options,
             online=online,
             groundtruth=groundtruth,

@@ -6,27 +6,24 @@ time miss more. The sum of the misses of all steps is least at the offset of the
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import dataclass
 
 import numpy as np
 
-from dqslam.inspection.comparison import WindowViews
+from dqslam.inspection.clock_costs import TimeCosts, step_costs, window_costs
 from dqslam.inspection.evidence import Evidence, Finding, Floats, NotEnoughDataError
-from dqslam.inspection.windows import FEWEST_STEPS, MOST_WINDOWS, Windows, find_windows
-from dqslam.recording.interpolation import interpolate_poses
+from dqslam.inspection.windows import MOST_WINDOWS
 
 # Offsets that are tried: steps to each side.
-STEPS, FEW_STEPS = 12, 4
+STEPS, FEW_STEPS = 12, 8
 # An offset is sure if boxes miss less by this number of standard deviations, and if it is so many
 # of its own from zero. Smaller motions within it are no mistake [px].
 SURE_GAIN, SURE_OFFSET, LEAST_MOTION_PX = 2.0, 3.5, 2.5
 # Beyond this share of the range, a path that repeats itself may fit as well.
 WITHIN = 0.75
-FEWEST_PARTS = 8
 RESAMPLES = 200
 SURE_DRIFT = 4.0
-# The least steps of the camera that are compared.
-FEWEST_COMPARED = 60
 MOST_CLOCK_WINDOWS = 5 * MOST_WINDOWS
 
 
@@ -68,34 +65,49 @@ def estimate_clock_offset(
     """Find the offset of the clocks at which boxes move most like the poses say.
 
     It is looked for within a number of steps, intervals of poses or half those of images, in at
-    most so many windows of a length.
+    most so many windows of a length, and between successive images. Of both estimates a sure one
+    counts, or else the one with the smaller spread.
 
     Raises
     ------
     NotEnoughDataError
         If too few boxes move from view to view.
     """
-    views = _views(evidence, most)
     step = _step(evidence)
     offsets = step * np.arange(-steps, steps + 1, dtype=float)
-    costs, when = _costs(evidence, views, offsets)
-    total = costs.sum(axis=0)
-    best, inside = _least(total)
-    spread = _spread(costs)
-    count = len(costs)
+    speed = _speed(evidence)
+    found: list[ClockOffset] = []
+    with contextlib.suppress(NotEnoughDataError):
+        found.append(_offset(window_costs(evidence, offsets, most), step, speed))
+    with contextlib.suppress(NotEnoughDataError):
+        found.append(_offset(step_costs(evidence, offsets), step, speed))
+    if not found:
+        raise NotEnoughDataError("too few boxes move from view to view")
+    return min(found, key=lambda one: (not one.sure, one.sigma))
+
+
+def _offset(compared: TimeCosts, step: float, speed: float) -> ClockOffset:
+    """Return the offset with the least costs; offsets are a step [s] apart, 0 in the middle.
+
+    ``speed`` is that of boxes [px/s].
+    """
+    costs = compared.costs
+    count, steps = len(costs), costs.shape[1] // 2
+    best, inside = _least(costs.sum(axis=0))
+    spread = compared.wider * _spread(costs)
     gains = costs[:, steps] - costs[:, int(np.clip(round(best), 0, 2 * steps))]
     noise = float(gains.std(ddof=1)) / np.sqrt(count)
     seconds = step * (best - steps)
-    drift, drift_sigma = _drift(costs, when)
+    drift, drift_sigma = _drift(costs, compared.when)
     return ClockOffset(
         seconds=seconds,
         sigma=step * max(spread, 0.05)
         if inside and abs(best - steps) <= WITHIN * steps
         else np.inf,
         gain_sigmas=float(gains.mean()) / max(noise, 1e-12),
-        motion_px=abs(seconds) * _speed(evidence, views),
+        motion_px=abs(seconds) * speed,
         drift=step * drift,
-        drift_sigma=step * drift_sigma,
+        drift_sigma=step * compared.wider * drift_sigma,
     )
 
 
@@ -128,20 +140,6 @@ def _judge(evidence: Evidence, clock: ClockOffset) -> Finding | None:
     )
 
 
-def _views(evidence: Evidence, most: int) -> WindowViews:
-    middle = (evidence.table.box[:, :2] + evidence.table.box[:, 2:]) / 2
-    time = evidence.table.timestamp
-    windows = find_windows(evidence.tracks(), middle, time, most=most)
-    moving = windows.length < 2
-    windows = Windows(
-        windows.rows[moving], windows.there[moving], windows.length[moving], windows.part[moving]
-    )
-    if np.sum(windows.there[:, 1:]) < FEWEST_STEPS or len(np.unique(windows.part)) < FEWEST_PARTS:
-        raise NotEnoughDataError("too few boxes move from view to view")
-    poses = interpolate_poses(*evidence.trajectory, time[windows.rows])
-    return WindowViews(evidence.camera, windows, poses, middle[windows.rows])
-
-
 def _step(evidence: Evidence) -> float:
     """Return a multiple of the interval of poses of at least half the interval of images [s].
 
@@ -151,51 +149,6 @@ def _step(evidence: Evidence) -> float:
     interval = float(np.median(np.diff(evidence.trajectory.timestamps)))
     images = np.diff(np.unique(evidence.table.timestamp))
     return interval * max(1, round(0.5 * float(np.median(images)) / interval))
-
-
-def _costs(evidence: Evidence, views: WindowViews, offsets: Floats) -> tuple[Floats, Floats]:
-    """Return the robust sum of misses in each part of the time, at each offset: (parts, k).
-
-    The middles of the parts in time are returned, too: (parts,) s.
-    """
-    windows = views.windows
-    rows, there = windows.rows, windows.there
-    time = evidence.table.timestamp[rows]
-    inside = (time + offsets[0] >= evidence.trajectory.timestamps[0]) & (
-        time + offsets[-1] <= evidence.trajectory.timestamps[-1]
-    )
-    known = there & inside
-    pair = known[:, :-1] & known[:, 1:] & (rows[:, :-1] != rows[:, 1:])
-    whole = np.all(inside | ~there, axis=1)  # at each offset, the same windows
-    pair &= whole[:, None]
-    frame = evidence.table.frame[rows]
-    # Boxes of one step of the camera miss together: their mean counts.
-    _, group = np.unique(
-        np.stack([frame[:, :-1][pair], frame[:, 1:][pair]]), axis=1, return_inverse=True
-    )
-    group = group.reshape(-1)
-    if group.size == 0 or group.max() + 1 < FEWEST_COMPARED:
-        raise NotEnoughDataError("too few boxes move from view to view")
-    number = np.bincount(group)
-    part = np.zeros(len(number), dtype=np.int64)
-    part[group] = np.broadcast_to(windows.part[:, None], pair.shape)[pair]
-    misses = []
-    for offset in offsets:
-        poses = interpolate_poses(*evidence.trajectory, time + offset)
-        moved = WindowViews(views.camera, windows, poses, views.middle)
-        change = np.nan_to_num(np.diff(moved.fit().error, axis=1), nan=1.0)[pair]
-        mean = [np.bincount(group, change[:, axis]) / number for axis in (0, 1)]
-        misses.append(number * (mean[0] ** 2 + mean[1] ** 2))
-    squares = np.array(misses).T
-    scale = float(np.median(squares.min(axis=1))) * 2 + 1e-18
-    costs = np.log1p(squares / scale)
-    parts = np.unique(part)
-    begin = np.zeros(len(number))
-    begin[group] = time[:, :-1][pair]
-    return (
-        np.array([costs[part == one].sum(axis=0) for one in parts]),
-        np.array([np.median(begin[part == one]) for one in parts]),
-    )
 
 
 def _drift(costs: Floats, when: Floats) -> tuple[float, float]:
@@ -216,8 +169,11 @@ def _drift(costs: Floats, when: Floats) -> tuple[float, float]:
 def _spread(costs: Floats) -> float:
     """Return the standard deviation of the least, if other parts of the time had been seen."""
     random = np.random.default_rng(0)
-    drawn = random.multinomial(len(costs), np.full(len(costs), 1 / len(costs)), RESAMPLES)
-    return float(np.std([_least(total)[0] for total in drawn @ costs]))
+    count = len(costs)
+    drawn = random.multinomial(count, np.full(count, 1 / count), RESAMPLES)
+    # Parts that are drawn from each other vary less than the parts themselves.
+    few = np.sqrt(count / (count - 1))
+    return float(few * np.std([_least(total)[0] for total in drawn @ costs]))
 
 
 def _least(costs: Floats) -> tuple[float, bool]:
@@ -230,10 +186,12 @@ def _least(costs: Floats) -> tuple[float, bool]:
     return row + (0.5 * (before - after) / bend if bend > 0 else 0.0), True
 
 
-def _speed(evidence: Evidence, views: WindowViews) -> float:
+def _speed(evidence: Evidence) -> float:
     """Return the median speed of the middles of boxes [px/s]."""
-    rows, there = views.windows.rows, views.windows.there
-    moved = np.linalg.norm(np.diff(views.middle, axis=1), axis=2)
-    seconds = np.diff(evidence.table.timestamp[rows], axis=1)
-    real = there[:, 1:] & (seconds > 0)
-    return float(np.median(moved[real] / seconds[real]))
+    table = evidence.table
+    middle = (table.box[:, :2] + table.box[:, 2:]) / 2
+    speeds = [
+        np.linalg.norm(np.diff(middle[track], axis=0), axis=1) / np.diff(table.timestamp[track])
+        for track in evidence.tracks()
+    ]
+    return float(np.median(np.concatenate(speeds)))

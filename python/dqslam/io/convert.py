@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -11,10 +11,10 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from dqslam import _core
-from dqslam.io.camera import CAMERA_FORMATS, read_camera
+from dqslam.io.camera import CAMERA_FORMATS
 from dqslam.io.camera.rosbag import KIND as CAMERA_INFO
 from dqslam.io.colmap_model import write_colmap_model
-from dqslam.io.detections import DETECTION_FORMATS, DetectionTable, read_detections
+from dqslam.io.detections import DETECTION_FORMATS, DetectionTable
 from dqslam.io.detections.rosbag import KIND as DETECTION_ARRAY
 from dqslam.io.files import FileError, refuse_inputs, whole_folder
 from dqslam.io.formats import (
@@ -25,14 +25,15 @@ from dqslam.io.formats import (
     named_format,
     no_progress,
 )
-from dqslam.io.frames import BY_NUMBER, FrameTimes, write_frame_times
+from dqslam.io.frames import BY_NUMBER, write_frame_times
 from dqslam.io.notes import Notes
 from dqslam.io.pose_graph import pose_graph_of_results, write_g2o
+from dqslam.io.reading import ReadOptions, read_boxes_file, read_camera_file, read_path_file
 from dqslam.io.results import load_results
 from dqslam.io.rosbag import NAME as BAG
 from dqslam.io.rosbag import bag_topics
-from dqslam.io.sources import KINDS, kind_of
-from dqslam.io.trajectory import TRAJECTORY_FORMATS, Trajectory, read_trajectory
+from dqslam.io.sources import KINDS, FormatNames, kind_of
+from dqslam.io.trajectory import TRAJECTORY_FORMATS, Trajectory
 from dqslam.io.trajectory.rosbag import KINDS as TRAJECTORIES
 from dqslam.io.trajectory.tf import STATIC
 
@@ -64,14 +65,9 @@ class Written:
 class ConvertContext:
     """Information that the files themselves lack; each part is needed by some formats only."""
 
-    size: tuple[int, int] | None = None  #: width and height of the image in px
-    frames: FrameTimes | None = None
-    first_frame: int | None = None  #: number of the first frame in the file
+    reading: ReadOptions = ReadOptions()  #: how the source is read, and the size of the image
     classes: dict[int, str] | None = None
-    body_from_camera: ArrayLike | None = None
-    camera_id: str | None = None  #: id of the camera, if the source has several
     odometry_covariance: str | Path | None = None  #: covariances of the steps, of results
-    nms: float | None = None  #: boxes that overlap a better one by this much are left out
     notes: Notes = field(default_factory=Notes)  #: collects what is left out and what is doubtful
     files: tuple[Path, ...] = ()  #: the files that these were read from, never written over
 
@@ -82,7 +78,6 @@ def convert(
     *,
     format: str | None = None,
     to: str | None = None,
-    topics: Sequence[str] = (),
     context: ConvertContext | None = None,
     progress: Progress = no_progress,
 ) -> list[Written]:
@@ -97,11 +92,8 @@ def convert(
     format, to
         Names of formats; by default the format of the source is recognized from the file, and
         that of the target from its ending.
-    topics
-        Topics of a bag that has several for a kind.
     context
-        Size of the image, times of frames, names of classes, mount of the camera, its id, and
-        the accuracy of odometry.
+        How the source is read, names of classes, and the accuracy of odometry.
     progress
         Called with the share of a bag or a folder that has been read; not for other files.
     """
@@ -116,9 +108,9 @@ def convert(
     kind = _kind(source, format, to)
     if kind is not None:
         target = _target(out, to, kind)
-        topic = _topics_by_kind(source, topics).get(kind) if topics else None
-        return _convert(source, out, kind, format, target, topic, context, progress)
-    named = _topics_by_kind(source, topics)
+        _check_topics(source, context.reading.topics)
+        return _convert(source, out, kind, format, target, context, progress)
+    _check_topics(source, context.reading.topics)
     # Transforms that do not move are no trajectory.
     there = {kind for name, kind in bag_topics(source).items() if not name.endswith(STATIC)}
     kinds = [kind for kind, (messages, *_) in FROM_BAG.items() if there & set(messages)]
@@ -131,9 +123,7 @@ def convert(
             _, name, target_name = FROM_BAG[kind]
             target = choose_format(out, target_name, FORMATS[kind], kind)
             share = partial(_part_progress, progress, done, len(kinds))
-            more = _convert(
-                source, folder / name, kind, BAG, target, named.get(kind), context, share
-            )
+            more = _convert(source, folder / name, kind, BAG, target, context, share)
             written += [Written(out / one.path.name, one.what, one.loses) for one in more]
             share(1.0)
     return written
@@ -208,16 +198,14 @@ def _target(out: Path, to: str | None, kind: str) -> Format[Any]:
     raise ValueError(f"{out}: its ending is of no format of {kind}; name one with --to: {known}")
 
 
-def _topics_by_kind(source: Path, topics: Sequence[str]) -> dict[str, str]:
-    messages = bag_topics(source)
-    found: dict[str, str] = {}
+def _check_topics(source: Path, topics: Sequence[str]) -> None:
+    """Refuse topics that a bag does not have."""
+    messages = bag_topics(source) if topics else {}
+    known = {message for of_kind, *_ in FROM_BAG.values() for message in of_kind}
     for topic in topics:
-        kinds = [kind for kind, (known, *_) in FROM_BAG.items() if messages.get(topic) in known]
-        if not kinds:
+        if messages.get(topic) not in known:
             has = ", ".join(messages)
             raise FileError(source, f"no topic {topic} that can be read (it has: {has})")
-        found[kinds[0]] = topic
-    return found
 
 
 def _convert(
@@ -226,50 +214,28 @@ def _convert(
     kind: str,
     format_name: str | None,
     target: Format[Any],
-    topic: str | None,
     context: ConvertContext,
     progress: Progress,
 ) -> list[Written]:
+    reading = replace(context.reading, formats=FormatNames(**{kind: format_name}))
     if kind == "camera":
-        camera = read_camera(
-            source,
-            format_name,
-            topic=topic,
-            camera_id=context.camera_id,
-            image_size=context.size,
-        )
-        return _write_camera(out, camera, target)
+        return _write_camera(out, read_camera_file(source, reading), target)
     origin = choose_format(source, format_name, FORMATS[kind], kind)
-    frames = context.frames
     # Numbers of frames are enough if neither side has times.
-    timeless = frames is None and not guarded(source, origin.name, origin.has_times, source)
+    timeless = reading.frames is None and not guarded(source, origin.name, origin.has_times, source)
     if timeless and not target.needs_times:
-        frames = BY_NUMBER
+        reading = replace(reading, frames=BY_NUMBER)
     if kind == "trajectory":
-        trajectory = read_trajectory(
-            source,
-            format_name,
-            frames=frames,
-            body_from_camera=context.body_from_camera,
-            topic=topic,
-            progress=progress,
-            notes=context.notes,
-        )
+        trajectory = read_path_file(source, reading, context.notes, progress=progress)
         return _write_trajectory(out, trajectory, target, times=not timeless)
-    width, height = context.size or (None, None)
-    table = read_detections(
+    table = read_boxes_file(
         source,
-        format_name,
-        width=width,
-        height=height,
-        frames=frames,
-        first_frame=context.first_frame,
+        reading.image_size,
+        reading,
+        context.notes,
         classes=context.classes,
         cut=False,
-        nms=context.nms,
-        topic=topic,
         progress=progress,
-        notes=context.notes,
     )
     return _write_detections(out, table, target, context, times=not timeless)
 
@@ -296,9 +262,10 @@ def _write_detections(
     assert target.write is not None
     options: dict[str, Any] = {} if target.name == "csv" else {"times": times}
     if target.name == "yolo":
-        if context.size is None:
+        size = context.reading.image_size
+        if size is None:
             raise ValueError(f"{out}: yolo's boxes are shares of the image: give it with --camera")
-        options |= dict(zip(("width", "height"), context.size, strict=True))
+        options |= dict(zip(("width", "height"), size, strict=True))
     target.write(out, table, **options)
     written = [Written(out, f"{len(table)} boxes as {target.name}", target.loses)]
     return written + (_beside(out, target, table.frame, table.timestamp) if times else [])

@@ -22,6 +22,7 @@ from dqslam._files import FileError as FileError
 from dqslam._files import refuse_inputs as refuse_inputs
 from dqslam._files import write_text as write_text
 from dqslam._input import read_text as read_text
+from dqslam._limits import IN_REACH, LARGEST_NUMBER
 
 
 def read_rows(path: str | Path) -> tuple[list[str], list[int]]:
@@ -41,21 +42,29 @@ def parse_numbers(
 ) -> NDArray[np.float64]:
     """Turn the cells of one column into finite numbers, shape (n,)."""
     values = parse_floats(path, name, cells, lines)
-    bad = np.flatnonzero(~np.isfinite(values))
+    bad = np.flatnonzero(np.isnan(values))
     if bad.size:
-        raise FileError(path, f"{name} is {cells[bad[0]].strip()}, not finite", lines[bad[0]])
+        raise FileError(path, f"{name} is {cells[bad[0]].strip()}, not {IN_REACH}", lines[bad[0]])
     return values
 
 
 def parse_floats(
     path: str | Path, name: str, cells: Sequence[str], lines: Sequence[int]
 ) -> NDArray[np.float64]:
-    """Turn the cells of one column into numbers, shape (n,), which may be NaN or infinite."""
+    """Turn the cells of one column into numbers, shape (n,), NaN where one is not in reach."""
     try:
-        return np.array(list(map(float, cells)), dtype=float)
+        return in_reach(np.array(list(map(float, cells)), dtype=float))
     except ValueError:
         _blame_cell(path, name, cells, lines)
         raise
+
+
+def in_reach(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return numbers, NaN where one is infinite or so large that no unit makes sense of it.
+
+    With what is left, no sum of squares and no polynomial of a lens overflows.
+    """
+    return np.where(np.abs(values) <= LARGEST_NUMBER, values, np.nan)
 
 
 def parse_integers(

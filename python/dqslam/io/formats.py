@@ -134,10 +134,13 @@ def guarded(path: str | Path, name: str, read: Callable[..., Any], *args: Any, *
     except OSError as error:
         raise FileError(path, f"cannot be read: {error.strerror or error}") from None
     except Exception as error:
-        # Some of these messages quote the file, which may be long.
-        said = " ".join(str(error)[:MOST_QUOTED].split())
-        message = f"cannot be read as {name}: {type(error).__name__}: {said}"
+        message = f"cannot be read as {name}: {type(error).__name__}: {quoted(error)}"
         raise FileError(path, message) from error
+
+
+def quoted(error: Exception) -> str:
+    """Return the message of another library in one line: some quote a file, which may be long."""
+    return " ".join(str(error)[:MOST_QUOTED].split())
 
 
 def look_at(path: str | Path) -> Look:

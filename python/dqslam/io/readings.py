@@ -80,12 +80,15 @@ class BoxReading:
         if self.letterbox and self.image is None:
             raise ValueError("a letterbox needs the size of its image")
 
-    def boxes(self, table: DetectionTable, size: tuple[int, int]) -> Floats:
+    def boxes(self, table: DetectionTable, size: tuple[int, int] | None) -> Floats:
         """Return the boxes of a table as corners in pixels of an image of this size, (m, 4)."""
         box = table.box if self.form is None else in_form(table, self.form)
-        return box if self.image is None else from_image(box, self.image, size, self.letterbox)
+        if self.image is None:
+            return box
+        assert size is not None
+        return from_image(box, self.image, size, self.letterbox)
 
-    def read(self, table: DetectionTable, size: tuple[int, int]) -> DetectionTable:
+    def read(self, table: DetectionTable, size: tuple[int, int] | None) -> DetectionTable:
         """Return the table with its boxes read so."""
         own_size = table.image_size if self.image is None else None
         return replace(table, box=self.boxes(table, size), image_size=own_size)
@@ -94,7 +97,9 @@ class BoxReading:
 def form_of(table: DetectionTable) -> str:
     """Return the form that the format of a file says, by the names of its columns."""
     columns = {plain(name) for name in table.columns}
-    if "cx" in columns or {"stamp", "bbox"} <= columns:  # YOLO, messages of ROS
+    if (
+        "cx" in {MEANING.get(name) for name in columns} or {"stamp", "bbox"} <= columns
+    ):  # YOLO, messages of ROS
         return "cxcywh"
     # A bbox of COCO, which has an image_id, is corner and size, and one of OA-SLAM two corners.
     of_oaslam = "bbox" in columns and "image_id" not in columns

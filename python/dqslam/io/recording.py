@@ -15,7 +15,6 @@ from dqslam.assumptions import OdometryNoise
 from dqslam.io.detections import DetectionTable
 from dqslam.io.extras import Extras
 from dqslam.io.files import FileError
-from dqslam.io.frames import FrameTimes
 from dqslam.io.nearest import nearest_pose
 from dqslam.io.notes import Notes
 from dqslam.io.reading import (
@@ -25,7 +24,6 @@ from dqslam.io.reading import (
     read_camera_file,
     read_path_file,
 )
-from dqslam.io.sources import FormatNames
 from dqslam.io.step_covariances import read_step_covariances
 from dqslam.io.trajectory import Trajectory
 from dqslam.lens import undistorted_or_nan
@@ -70,11 +68,8 @@ def load_recording(
     min_score: float = 0.5,
     ids: Ids = "track_id",
     final_ids: bool = True,
-    max_time_difference: float | None = None,
     odometry_noise: OdometryNoise | None = None,
     odometry_covariance: str | Path | None = None,
-    formats: FormatNames | None = None,
-    frames: FrameTimes | None = None,
     reading: ReadOptions | None = None,
     notes: Notes | None = None,
     extras: Extras | None = None,
@@ -97,21 +92,13 @@ def load_recording(
         Whether these ids are final. Then three kinds of boxes are left out: those without an id,
         the worse one of two boxes with the same id in an image, and those whose id has fewer than 3
         boxes.
-    max_time_difference
-        The most seconds from a box to the nearest pose in time; by default half the median interval
-        between poses.
     odometry_noise
         The uncertainty of each step, because trajectory files have none.
     odometry_covariance
         A file with the covariance of each step, which replaces ``odometry_noise``: see
         ``io.step_covariances``.
-    formats
-        Names of the formats, for files that cannot be recognized.
-    frames
-        Times of the frames, for files that only number them: see ``choose_frame_times``.
     reading
-        How the files are read beside that, and what numbers in them mean, by default
-        ``ReadOptions()``.
+        How the files are read, and what numbers in them mean, by default ``ReadOptions()``.
     notes
         Collects what is left out of the files and what is doubtful in them; by default these are
         warnings of Python, of the category ``InputWarning``.
@@ -149,19 +136,16 @@ def load_recording(
     """
     if not 0 <= min_score <= 1:
         raise ValueError(f"min_score is {min_score:g}, not between 0 and 1")
-    if max_time_difference is not None and not max_time_difference >= 0:
-        raise ValueError(f"max_time_difference is {max_time_difference:g}, negative")
-    names, how = formats or FormatNames(), reading or ReadOptions()
+    how = reading or ReadOptions()
     own = Notes(max_bad=how.max_bad) if notes is None else notes
     check_topics(camera, odometry, detections, how)
-    lens = read_camera_file(camera, names, how)
-    trajectory = read_path_file(odometry, names, frames, how, own)
+    lens = read_camera_file(camera, how)
+    trajectory = read_path_file(odometry, how, own)
     pose_times, path = trajectory
     if len(pose_times) < 2:
         raise FileError(odometry, "one pose only: nothing moves")
-    table = read_boxes_file(
-        detections, lens, trajectory, names, frames, how, own, min_score=min_score
-    )
+    size = (lens.width, lens.height)
+    table = read_boxes_file(detections, size, how, own, trajectory=trajectory, min_score=min_score)
     if notes is None:
         own.warn()
     if examine is not None:
@@ -173,7 +157,8 @@ def load_recording(
     steps, times = Odometry.from_poses(path, covariance=covariance), pose_times
     _, late = nearest_pose(times, table.timestamp)
     half = 0.5 * float(np.median(np.diff(times)))
-    tolerance = half * (1 + ROUNDING) if max_time_difference is None else max_time_difference
+    latest = how.max_time_difference
+    tolerance = half * (1 + ROUNDING) if latest is None else latest
     if interpolate:
         outside = (table.timestamp < times[0]) | (table.timestamp > times[-1])
         late[outside & (late > 2 * NEAR_SHARE * half)] = np.inf

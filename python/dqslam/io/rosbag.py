@@ -13,7 +13,7 @@ from typing import Any
 
 from dqslam.io.bag_limits import check_bag
 from dqslam.io.files import FileError
-from dqslam.io.formats import MOST_QUOTED, Look, Progress, no_progress
+from dqslam.io.formats import Look, Progress, no_progress, quoted
 
 NAME = "rosbag"
 LOOKS = "a .bag, .mcap or .db3 file, or a folder with metadata.yaml"
@@ -100,7 +100,7 @@ def _opened(path: str | Path) -> Iterator[Any]:
         raise
     except Exception as error:
         # A broken bag can fail in rosbags, in sqlite or in a codec, and each has its own errors.
-        raise FileError(path, f"is no bag that can be read: {str(error)[:MOST_QUOTED]}") from error
+        raise FileError(path, f"is no bag that can be read: {quoted(error)}") from error
 
 
 def _topics(bag: Any) -> list[tuple[str, str]]:

@@ -150,8 +150,7 @@ def _rotations(table: CsvTable) -> Floats | None:
 
     if all(name in table for name in QUATERNION):
         xyzw = _columns(table, QUATERNION)
-        with np.errstate(over="ignore"):  # an infinite length is not 1
-            off = np.abs(np.linalg.norm(xyzw, axis=1) - 1.0) > NORM_TOLERANCE
+        off = np.abs(np.linalg.norm(xyzw, axis=1) - 1.0) > NORM_TOLERANCE
         table.reject(off, "the quaternion is not of length 1")
         return np.asarray(Rotation.from_quat(xyzw).as_matrix())
     if "yaw" not in table:

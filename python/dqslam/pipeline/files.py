@@ -108,17 +108,13 @@ def _run(
 ) -> RunResult:
     """Estimate a recording in files, and describe where everything came from."""
     camera, odometry, detections = files
-    if options.frames is None:
-        times = io.choose_frame_times(odometry, detections, options.formats)
-        options = replace(options, frames=times)
+    options = replace(options, reading=options.reading.with_frame_times(odometry, detections))
     reference, reference_name = None, None
     if groundtruth is not None:
         reference, reference_name = io.read_trajectory(groundtruth, repeated_times=True), "file"
     elif options.added_noise is not None:
         quiet = io.Notes(max_bad=options.reading.max_bad)  # the same are said of the recording
-        reference = io.read_path_file(
-            odometry, options.formats, options.frames, options.reading, quiet
-        )
+        reference = io.read_path_file(odometry, options.reading, quiet)
         reference_name = "odometry before the added noise"
     says_noise = bool(options.believed_noise or options.odometry_covariance)
     notes = io.Notes(max_bad=options.reading.max_bad)
@@ -180,11 +176,8 @@ def _load(
         min_score=options.min_score,
         ids=options.ids,
         final_ids=options.trust_ids == FINAL,
-        max_time_difference=options.max_time_difference,
         odometry_noise=options.believed_noise,
         odometry_covariance=options.odometry_covariance,
-        formats=options.formats,
-        frames=options.frames,
         reading=options.reading,
         notes=notes,
         extras=options.extras,
@@ -209,9 +202,8 @@ def _examine(
     if len(trajectory.timestamps) < 2:
         return [], ()  # refused later
     ids = None if options.ids == "none" or options.trust_ids != FINAL else options.ids
-    findings, notes = first_findings(
-        camera, trajectory, table, ids=ids, max_time_difference=options.max_time_difference
-    )
+    latest = options.reading.max_time_difference
+    findings, notes = first_findings(camera, trajectory, table, ids=ids, max_time_difference=latest)
     fatal = [str(finding) for finding in findings if finding.check in FATAL]
     if fatal and not options.force:
         raise ValueError(

@@ -9,7 +9,7 @@ from pathlib import Path
 from dqslam import _core
 from dqslam.association import FINAL
 from dqslam.assumptions import BoxNoise, OdometryNoise, SizePrior, SizePriors
-from dqslam.io import Extras, FormatNames, FrameTimes, ReadOptions
+from dqslam.io import Extras, ReadOptions
 from dqslam.io.recording import Ids
 
 Progress = Callable[[float, str], None]
@@ -53,17 +53,11 @@ class RunFilesOptions(RunOptions):
     """Column that tells which boxes show the same object; with "none" it is found out."""
     min_score: float = 0.5
     """Least score of a box, 0 to 1; boxes below are left out."""
-    formats: FormatNames = FormatNames()
-    """Names of the formats of files that do not look like what they are."""
     extras: Extras = Extras()
     """Files of positions of objects, of absolute positions and of loop closures."""
-    frames: FrameTimes | None = None
-    """Times of frames, for files that only count them; None takes their numbers for seconds where
-    the trajectory counts frames, too."""
     reading: ReadOptions = ReadOptions()
-    """How the files are read beside that: bad records, topics, what numbers mean, ..."""
-    max_time_difference: float | None = None
-    """Seconds from a box to its pose; None is half the median interval between poses."""
+    """How the files are read: formats, times of frames, bad records, what numbers mean, ... Without
+    times of frames, their numbers are seconds where the trajectory counts frames, too."""
     force: bool = False
     """Whether to go on if poses and boxes do not fit together, or would in another reading."""
     added_noise: OdometryNoise | None = None

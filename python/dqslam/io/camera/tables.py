@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from dqslam._limits import IN_REACH, LARGEST_NUMBER
 from dqslam.io.files import FileError, read_text
 
 
@@ -81,8 +82,8 @@ class Table:
             number = float(value)
         except OverflowError:
             number = math.inf
-        if not math.isfinite(number):
-            raise self.error(f"{key} is {number}, not finite", key)
+        if not abs(number) <= LARGEST_NUMBER:
+            raise self.error(f"{key} is {number}, not {IN_REACH}", key)
         return number
 
 

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
+import numpy as np
+
+from dqslam._checks import Floats
 from dqslam.io.files import FileError
 from dqslam.io.notes import Notes
 
@@ -19,6 +22,8 @@ SPELLINGS: dict[str, tuple[str, ...]] = {
     "y1": ("y1", "ymin", "y_min", "top", "box_y1", "bbox_y1", "bb_top"),
     "x2": ("x2", "xmax", "x_max", "right", "box_x2", "bbox_x2"),
     "y2": ("y2", "ymax", "y_max", "bottom", "box_y2", "bbox_y2"),
+    "cx": ("cx", "center_x", "x_center", "xcenter", "centre_x", "bbox_cx", "xc"),
+    "cy": ("cy", "center_y", "y_center", "ycenter", "centre_y", "bbox_cy", "yc"),
     "width": ("width", "w", "bb_width", "bbox_width"),
     "height": ("height", "h", "bb_height", "bbox_height"),
     "score": ("score", "confidence", "conf", "probability", "prob"),
@@ -31,6 +36,31 @@ MEANING = {spelling: name for name, all_of in SPELLINGS.items() for spelling in 
 SILENT = {"", "unnamed_0", "index", "area"}
 CORNERS = ("x1", "y1", "x2", "y2")
 SIZES = ("x1", "y1", "width", "height")
+CENTERS = ("cx", "cy", "width", "height")
+
+
+def edges_of(path: str | Path, names: Mapping[str, str], notes: Notes) -> tuple[str, ...]:
+    """Return which four of the known columns are the box: corners, corner and size, or center.
+
+    ``x`` and ``y`` beside a size are taken for the corner, which is noted.
+    """
+    if {"x2", "y2"} & set(names) or "width" not in names:
+        return CORNERS
+    if {"cx", "cy"} & set(names):
+        return CENTERS
+    if plain(names.get("x1", "")) == "x":
+        notes.doubt(
+            path, "x and y are taken for the corner of a box: --box-form cxcywh if its center"
+        )
+    return SIZES
+
+
+def corners_of(numbers: Floats, edges: Sequence[str]) -> Floats:
+    """Return corners (m, 4) from the numbers of these four columns (m, 4)."""
+    first, second = numbers[:, :2], numbers[:, 2:]
+    if edges == CENTERS:
+        return np.hstack([first - second / 2, first + second / 2])
+    return np.hstack([first, first + second]) if edges == SIZES else numbers
 
 
 def counted_from_corner(names: Iterable[str]) -> bool:
@@ -70,11 +100,24 @@ def known_columns(
                 unknown.append(name)
         elif meaning not in found:
             found[meaning] = name
+        elif meaning == "class_id" and "class" in (key, plain(found[meaning])):
+            # Beside an id, "class" is the name, as Roboflow has it.
+            label = name if key == "class" else found[meaning]
+            if "class_name" in found:
+                raise FileError(
+                    path, f"columns {label} and {found['class_name']} are both a name", line
+                )
+            found["class_id"] = found[meaning] if key == "class" else name
+            found["class_name"] = label
         elif meaning == "track_id" and "id" in (key, plain(found[meaning])):
             found[meaning] = name if plain(found[meaning]) == "id" else found[meaning]
         else:
             message = f"columns {found[meaning]} and {name} are both the {meaning}"
             raise FileError(path, message, line)
+    # x and y alone may be of anything, beside a size and no other place they are of the box.
+    if {"width", "height"} <= set(found) and not {"x1", "y1", "cx", "cy"} & set(found):
+        found |= {f"{plain(name)}1": name for name in unknown if plain(name) in ("x", "y")}
+        unknown = [name for name in unknown if plain(name) not in ("x", "y")]
     if unknown:
         notes.doubt(path, f"not used: {', '.join(unknown[:12])}" + (", ..." * (len(unknown) > 12)))
     return found

@@ -26,8 +26,9 @@ from dqslam.io.csv_table import read_csv as read_table
 from dqslam.io.detections.columns import (
     CORNERS,
     MEANING,
-    SIZES,
+    corners_of,
     counted_from_corner,
+    edges_of,
     known_columns,
     plain,
 )
@@ -45,7 +46,7 @@ def read_csv(path: str | Path, context: ReadContext) -> DetectionTable:
     """Read boxes, unchecked."""
     cells = read_table(path, allow_empty=True)
     names = known_columns(path, cells.columns, context.notes, cells.header)
-    edges = SIZES if not {"x2", "y2"} & set(names) and "width" in names else CORNERS
+    edges = edges_of(path, names, context.notes)
     missing = [name for name in edges if name not in names]
     if not {"frame", "timestamp", "image"} & set(names):
         missing.insert(0, "frame, timestamp or image")
@@ -77,8 +78,7 @@ def read_csv(path: str | Path, context: ReadContext) -> DetectionTable:
 def _boxes(cells: CsvTable, edges: Sequence[str], names: Sequence[str]) -> Floats:
     """Return corners (m, 4) px."""
     box = np.column_stack([_floats(cells, name) for name in names])
-    if edges == SIZES:
-        box[:, 2:] += box[:, :2]
+    box = corners_of(box, edges)
     return box - CORNER if counted_from_corner(names) else box
 
 

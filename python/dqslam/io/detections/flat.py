@@ -3,7 +3,8 @@
 A box is an object with the names of the CSV format, in any of their spellings (``x_min y_min x_max
 y_max confidence class_id tracker_id``, ...), or with ``box`` or ``bbox`` as a table of these
 (``{"x1": ..}``, as Ultralytics has it). An object may also be an image with a list ``detections``
-(or ``boxes``, ``objects``, ``predictions``) of boxes. Pixels count as in the CSV format. JSON
+(or ``boxes``, ``objects``, ``predictions``) of boxes; in answers of Roboflow, ``x`` and ``y`` of
+its ``predictions`` are centers. Pixels count as in the CSV format. JSON
 lines, an object in each line, may also be those of COCO, with a list ``bbox`` of x, y, width,
 height.
 """
@@ -19,10 +20,12 @@ import numpy as np
 from dqslam._checks import Floats, Ints
 from dqslam.io.detections.coco import coco_table
 from dqslam.io.detections.columns import (
+    CENTERS,
     CORNERS,
     MEANING,
-    SIZES,
+    corners_of,
     counted_from_corner,
+    edges_of,
     known_columns,
     plain,
 )
@@ -35,6 +38,8 @@ from dqslam.io.formats import Format, Look, ReadContext
 
 NESTED = ("box", "bbox", "xyxy")
 LISTS = ("detections", "boxes", "objects", "predictions")  #: of an image's boxes
+ROBOFLOW = "predictions"  #: beside a table "image"; its x and y are centers
+_OF_CENTER = {"x": "cx", "y": "cy"}
 
 
 def read_flat(path: str | Path, context: ReadContext) -> DetectionTable:
@@ -60,7 +65,7 @@ def flat_table(
         raise FileError(path, "holds no boxes")
     keys = dict.fromkeys(key for entry in entries for key in entry.fields)
     names = known_columns(path, keys, context.notes)
-    edges = SIZES if not {"x2", "y2"} & set(names) and "width" in names else CORNERS
+    edges = edges_of(path, names, context.notes)
     missing = [name for name in edges if name not in names]
     if not {"frame", "timestamp", "image"} & set(names):
         missing.insert(0, "frame, timestamp or image")
@@ -68,8 +73,7 @@ def flat_table(
         raise entries[0].error(f"missing {', '.join(missing)} (it has: {', '.join(keys)})")
     spelled = [names[name] for name in edges]
     box = np.array([[entry.number(name) for name in spelled] for entry in entries])
-    if edges == SIZES:
-        box[:, 2:] += box[:, :2]
+    box = corners_of(box, edges)
 
     def labels(name: str) -> list[str] | None:
         return [entry.label(names[name]) for entry in entries] if name in names else None
@@ -106,6 +110,10 @@ def _boxes_of(entry: Entry) -> list[Entry]:
     if not all(isinstance(box, dict) for box in boxes):
         raise entry.error(f"{key} is no list of tables of named values")
     common = {name: value for name, value in entry.fields.items() if name != key}
+    if key == ROBOFLOW and isinstance(common.get("image"), dict):
+        common.pop("image")
+        common.pop("time", None)  # that the prediction took
+        boxes = [{_OF_CENTER.get(name, name): one for name, one in box.items()} for box in boxes]
     return [Entry(entry.path, entry.index, entry.line, common | box) for box in boxes]
 
 
@@ -127,7 +135,7 @@ def _flattened(entry: Entry) -> Entry:
     return Entry(entry.path, entry.index, entry.line, fields)
 
 
-_NUMBERS = {*CORNERS, *SIZES, "score", "timestamp", "frame"}
+_NUMBERS = {*CORNERS, *CENTERS, "score", "timestamp", "frame"}
 
 
 def _number(value: Any) -> Any:
@@ -152,7 +160,8 @@ def _looks_flat(look: Look) -> bool:
         return False
     start = look.head.partition("}")[0]  # the first box, or what is before its nested box
     names = {MEANING.get(plain(part)) for part in start.split('"')[1::2]}
-    return {"x1", "y1"} <= names and '"image_id"' not in start
+    placed = {"x1", "y1"} <= names or {"cx", "cy"} <= names or f'"{ROBOFLOW}"' in look.head
+    return placed and '"image_id"' not in start
 
 
 SUPERVISION = Format(

@@ -9,7 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from dqslam.io.files import FileError
+import numpy as np
+
+from dqslam.io.files import FileError, in_reach
 
 SPACE = re.compile(r"[ \t\n\r]*")
 
@@ -34,14 +36,14 @@ class Entry:
         return self.fields[key]
 
     def number(self, key: str, default: float | None = None) -> float:
-        """Return a number, which may be NaN or infinite; null counts as missing."""
+        """Return a number, NaN if it is not in reach; null counts as missing."""
         value = self.value(key) if default is None else self.fields.get(key)
         if value is None and default is not None:
             return default
         return self._number(key, value)
 
     def numbers(self, key: str, count: int) -> list[float]:
-        """Return a list of numbers with the given length, which may be NaN or infinite."""
+        """Return a list of numbers with the given length, NaN where one is not in reach."""
         values = self.value(key)
         if not isinstance(values, list) or len(values) != count:
             raise self.error(f"{key} is not a list of {count} numbers")
@@ -76,9 +78,9 @@ class Entry:
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise self.error(f"{key} is {value!r}, not a number")
         try:
-            return float(value)
-        except OverflowError:
-            raise self.error(f"{key} is too large a number") from None
+            return float(in_reach(np.array(float(value))))
+        except OverflowError:  # a whole number of hundreds of digits
+            return math.nan
 
 
 def parse_entries(path: str | Path, text: str, key: str) -> tuple[list[Entry], dict[str, Any]]:

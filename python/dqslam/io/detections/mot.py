@@ -25,7 +25,7 @@ from dqslam._checks import Floats
 from dqslam.io.detections.csv import short
 from dqslam.io.detections.records import NO_TIMES, Records, make_table
 from dqslam.io.detections.table import NO_SCORE, DetectionTable
-from dqslam.io.files import FileError, parse_floats, parse_integers, read_rows, write_text
+from dqslam.io.files import FileError, in_reach, parse_floats, parse_integers, read_rows, write_text
 from dqslam.io.formats import Format, Look, ReadContext
 
 FIELDS = ("frame", "id", "left", "top", "width", "height", "conf")
@@ -131,7 +131,7 @@ def _looks(look: Look) -> bool:
     if len(cells) not in WIDTHS or cells[0] >= LARGEST_FRAME or cells[0] != int(cells[0]):
         return False
     # A pose has 8 numbers, too.
-    return len(cells) != 8 or bool(abs(np.linalg.norm(cells[4:]) - 1) > UNIT)
+    return len(cells) != 8 or not abs(np.linalg.norm(in_reach(np.array(cells[4:]))) - 1) <= UNIT
 
 
 MOT = Format(

@@ -8,10 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from dqslam._checks import Bools, Floats, Ints
+from dqslam._checks import Floats, Ints
+from dqslam._limits import IN_REACH
 from dqslam.io.detections.classes import number_classes
 from dqslam.io.detections.table import NO_SCORE, DetectionTable
-from dqslam.io.files import FileError
+from dqslam.io.files import FileError, in_reach
 from dqslam.io.formats import ReadContext
 from dqslam.io.frames import FrameTimes
 from dqslam.io.image_names import ImageNameError, frames_of_images, image_name
@@ -103,12 +104,13 @@ def make_table(
 def _with_numbers(table: DetectionTable, context: ReadContext) -> DetectionTable:
     """Leave out boxes whose corners, score or time are no finite numbers."""
     cells = np.column_stack([table.timestamp, table.box, table.score])
-    bad: Bools = ~np.all(np.isfinite(cells), axis=1)
+    good = ~np.isnan(in_reach(cells))
+    bad = ~np.asarray(good.all(axis=1))
     names = ("timestamp", "x1", "y1", "x2", "y2", "score")
 
     def error(row: int) -> FileError:
-        column = int(np.flatnonzero(~np.isfinite(cells[row]))[0])
-        return table.error(row, f"{names[column]} is {cells[row, column]:g}, not finite")
+        column = int(np.flatnonzero(~good[row])[0])
+        return table.error(row, f"{names[column]} is not {IN_REACH}")
 
     rows = np.flatnonzero(bad).tolist()
     context.notes.leave_out(table.path, "boxes", "not finite", rows, len(table), error)

@@ -7,13 +7,14 @@ the frame or the time of an image, see `dqslam.io.image_names`; images may be in
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
 
 from dqslam import _core
 from dqslam._checks import Floats
-from dqslam.io.files import FileError, read_text
+from dqslam.io.files import FileError, in_reach, read_text
 from dqslam.io.formats import Format, Look, ReadContext
 from dqslam.io.image_names import ImageNameError, frames_of_images, have_times, image_name
 from dqslam.io.trajectory.table import (
@@ -25,6 +26,7 @@ from dqslam.io.trajectory.table import (
 
 FIELDS = ("qw", "qx", "qy", "qz", "tx", "ty", "tz")
 CAMERA, NAME = 8, 9  #: places in a line
+NUMBERS = re.compile(r"[-+.\deE\s]+")
 
 
 def read_colmap(path: str | Path, context: ReadContext) -> Trajectory:
@@ -73,8 +75,10 @@ def _is_image(fields: list[str]) -> bool:
     """Return whether these fields are an image: whole ids, and a unit quaternion."""
     if len(fields) != NAME + 1 or not (fields[0].isdigit() and fields[CAMERA].isdigit()):
         return False
+    if len(fields[NAME].split()) > 1 and NUMBERS.fullmatch(fields[NAME]):
+        return False  # a frame and a matrix of KITTI-360, not a turned camera
     try:
-        quaternion = [float(field) for field in fields[1:5]]
+        quaternion = in_reach(np.array(fields[1:5], dtype=float))
     except ValueError:
         return False
     return bool(abs(np.linalg.norm(quaternion) - 1) < NORM_TOLERANCE)

@@ -51,6 +51,16 @@ def _meanings() -> dict[str, str]:
 
 
 MEANING = _meanings()
+# Tables of ROS messages have the path of a field for its name: field.pose.pose.orientation.x.
+MESSAGE = re.compile(r".*_(position|orientation)_([xyzw])")
+
+
+def _meaning(bare: str) -> str | None:
+    """Return which of FIELDS a name is, in lower case and with _ between its parts."""
+    field = MESSAGE.fullmatch(bare)
+    if bare not in MEANING and field is not None:
+        return ("t" if field[1] == "position" else "q") + field[2]
+    return MEANING.get(bare)
 
 
 def parse_header(text: str) -> Header | None:
@@ -73,7 +83,7 @@ def parse_header(text: str) -> Header | None:
         for ending, ending_unit in TIME_UNITS.items():
             if bare.endswith(ending) and bare.removesuffix(ending) in SPELLINGS["t"]:
                 bare, given = bare.removesuffix(ending), ending_unit
-        meaning = MEANING.get(bare)
+        meaning = _meaning(bare)
         if meaning is None or meaning in columns:
             others.append(name.strip())
         else:

@@ -9,16 +9,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dqslam.io.files import FileError, parse_floats
+from dqslam._limits import IN_REACH, LARGEST_COORDINATE_M
+from dqslam.io.files import FileError, in_reach, parse_floats
 from dqslam.io.formats import ReadContext
 
 # Files may round quaternions to 4 digits, which changes the norm by up to 1e-4; more is a mistake.
 NORM_TOLERANCE = 1e-3
 # The error of nine decimals; a quaternion with a smaller error is not normalized.
 ROUNDING = 2e-9
-
-# A larger coordinate is in another unit or column; no place on Earth has it, in any frame.
-LARGEST_COORDINATE = 1e8
 NAMES = ("t", "tx", "ty", "tz", "qx", "qy", "qz", "qw")
 
 
@@ -55,9 +53,9 @@ def make_trajectory(
     keep = _new(path, times, poses, line_numbers, context)
     times, poses, line_numbers = times[keep], poses[keep], line_numbers[keep]
     _check_times(path, times, line_numbers)
-    far = np.flatnonzero(np.abs(poses[:, :3]).max(axis=1) > LARGEST_COORDINATE)
+    far = np.flatnonzero(np.abs(poses[:, :3]).max(axis=1) > LARGEST_COORDINATE_M)
     if far.size:
-        message = f"position is further than {LARGEST_COORDINATE:g} m from the origin"
+        message = f"position is further than {LARGEST_COORDINATE_M:g} m from the origin"
         raise FileError(path, message, int(line_numbers[far[0]]))
     return Trajectory(times, _normalized(path, poses, line_numbers))
 
@@ -71,16 +69,16 @@ def _finite(
 ) -> NDArray[np.bool_]:
     """Return which poses are finite and have a rotation, and note the others."""
     cells = np.column_stack([times, poses])
-    finite: NDArray[np.bool_] = np.all(np.isfinite(cells), axis=1)
+    good = ~np.isnan(in_reach(cells))
+    finite = np.asarray(good.all(axis=1))
     # Programs that lost track also write a quaternion of zeros.
     bad: NDArray[np.bool_] = ~finite | np.all(poses[:, 3:] == 0, axis=1)
 
     def error(row: int) -> FileError:
         if finite[row]:
             return FileError(path, "quaternion has length 0, not 1", int(lines[row]))
-        column = int(np.flatnonzero(~np.isfinite(cells[row]))[0])
-        message = f"{NAMES[column]} is {cells[row, column]:g}, not finite"
-        return FileError(path, message, int(lines[row]))
+        column = int(np.flatnonzero(~good[row])[0])
+        return FileError(path, f"{NAMES[column]} is not {IN_REACH}", int(lines[row]))
 
     rows = np.flatnonzero(bad).tolist()
     context.notes.leave_out(path, "poses", "no pose", rows, len(cells), error)

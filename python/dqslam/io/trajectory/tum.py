@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dqslam.io.files import write_text
+from dqslam.io.files import in_reach, write_text
 from dqslam.io.formats import Format, Look
 from dqslam.io.trajectory.columns import WITH_ID, read_columns, split_row
 from dqslam.io.trajectory.header import FIELDS, find_header
@@ -47,7 +47,7 @@ def _looks(look: Look) -> bool:
     if "," in look.first and cells[0].isdigit():
         return False  # EuRoC's, with w first, or frames of MOT
     # Boxes of MOT have as many numbers, and the first is a whole one as well.
-    length = np.linalg.norm(values[4:8])
+    length = np.linalg.norm(in_reach(np.array(values[4:8])))
     may_turn = not np.isfinite(length) or length <= LONGEST
     return bool(may_turn) and (len(cells) == len(FIELDS) or cells[8].isdigit())
 
