@@ -119,6 +119,23 @@ def test_a_symmetric_map_is_ambiguous():
     np.testing.assert_allclose(np.sort(places[:, 1]), [-8.0, 8.0], atol=1e-3)
 
 
+@pytest.mark.parametrize(
+    ("candidates", "fewest", "message"),
+    [
+        ([[], []], 0, "fewest must be at least 1"),
+        ([[0]], 1, "candidates: need one list for each of 2 boxes"),
+        ([[0], [1]], 1, "candidates: 1 is no object"),
+        ([[], []], 1, "0 boxes show objects of the map, 1 are needed"),
+    ],
+)
+def test_the_core_refuses_what_is_no_view(candidates, fewest, message):
+    camera = chain(1, 2, 0, 0.1).recording.camera
+    tables = np.zeros((1, 9)), np.eye(9).reshape(1, 81), np.tile([1.0, 2.0, 30.0, 40.0], (2, 1))
+    noise, cut = np.repeat(np.eye(4).reshape(1, 16), 2, axis=0), np.zeros((2, 4), dtype=bool)
+    with pytest.raises(ValueError, match=message):
+        _core.relocalize(dq.PoseModel.SE2, camera, *tables, noise, cut, candidates, fewest)
+
+
 def test_a_saved_map_comes_back(mapped, saved):
     known = load_map(saved)
     objects = mapped.objects

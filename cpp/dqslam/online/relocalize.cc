@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "dqslam/costs/whitening.h"
+#include "dqslam/geometry/batch.h"
 #include "dqslam/geometry/dispatch.h"
 #include "dqslam/online/levenberg_marquardt.h"
 #include "dqslam/online/linearize.h"
@@ -267,9 +268,31 @@ class Search {
   std::vector<Place> places_;
 };
 
+void CheckView(const MapView& view) {
+  const Eigen::Index objects = view.ellipsoids.rows(), boxes = view.box.rows();
+  RequireShape("ellipsoids", view.ellipsoids, objects, kLandmarkSize);
+  RequireShape("covariance", view.covariance, objects, kLandmarkSize * kLandmarkSize);
+  RequireShape("box", view.box, boxes, kBoxSize);
+  RequireShape("box_covariance", view.box_covariance, boxes, kBoxSize * kBoxSize);
+  RequireShape("truncated", view.truncated, boxes, kBoxSize);
+  if (static_cast<Eigen::Index>(view.candidates.size()) != boxes) {
+    throw std::invalid_argument("candidates: need one list for each of " + std::to_string(boxes) +
+                                " boxes");
+  }
+  for (const std::vector<int>& rows : view.candidates) {
+    for (const int row : rows) {
+      if (row < 0 || row >= objects) {
+        throw std::invalid_argument("candidates: " + std::to_string(row) + " is no object");
+      }
+    }
+  }
+}
+
 }  // namespace
 
 Relocation Relocalize(PoseModel pose_model, const Camera& camera, const MapView& view, int fewest) {
+  if (fewest < 1) throw std::invalid_argument("relocalize: fewest must be at least 1");
+  CheckView(view);
   int shown = 0;
   for (const std::vector<int>& objects : view.candidates) shown += !objects.empty();
   if (shown < fewest) {
