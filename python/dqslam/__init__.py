@@ -39,6 +39,7 @@ if TYPE_CHECKING:  # the one list of public names, a line each: lazy_exports rea
     from dqslam._core import StepReport as StepReport
     from dqslam._core import Summary as Summary
     from dqslam._core import VariableKind as VariableKind
+    from dqslam._version import __version__ as __version__
     from dqslam.absolute import solve_with_absolute_positions as solve_with_absolute_positions
     from dqslam.association import Association as Association
     from dqslam.association import associate as associate

@@ -2,6 +2,7 @@
 
 import ast
 import enum
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -40,9 +41,17 @@ def test_every_choice_of_the_core_is_public():
         for name, value in vars(_core).items()
         if isinstance(value, type) and issubclass(value, enum.Enum)
     ]
-    assert len(choices) == 10
+    assert len(choices) == 11
     for name in (*choices, "State"):
         assert getattr(dqslam, name) is getattr(_core, name)
+
+
+def test_the_version_is_the_latest_of_the_changelog():
+    changes = SOURCE.parents[2] / "CHANGELOG.md"
+    if not changes.is_file():
+        pytest.skip("the package is installed without its project")
+    latest = re.search(r"^## \[([^]]+)\]", changes.read_text(), re.MULTILINE)
+    assert dqslam.__version__ == latest[1]
 
 
 def test_an_unknown_name():
