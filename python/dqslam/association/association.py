@@ -16,6 +16,7 @@ from dqslam.association.initiation import MIN_VIEWS
 from dqslam.association.keyframes import choose_keyframes
 from dqslam.association.labels import Labels
 from dqslam.association.noise import StepNoise
+from dqslam.association.occlusion import shortened_edges
 from dqslam.association.refine import reassign
 from dqslam.association.scene_map import ANY_SIZE, SceneMap
 from dqslam.association.thinning import fill_in, thin_recording
@@ -45,6 +46,8 @@ class Association:
     """Ids of the objects, -1 for one that was given up, shape (o,)."""
     left_out: dict[int, str]
     """Ids of objects that do not fit a world at rest, and why. Their boxes keep the ids."""
+    hidden: Bools
+    """Whether a nearer object seems to hide each edge of each box, shape (m, 4)."""
     remarks: tuple[str, ...] = ()
     """Sentences on attempts that were made, and on steps that are no noise."""
 
@@ -167,6 +170,7 @@ def associate(
             step_noise=noise,
             levels=None if levels is None else raised * levels,
             mode=mode,
+            minds_occlusion=True,
         )
 
     attempt, remarks = make_map(make_scene, trust, progress)
@@ -185,8 +189,27 @@ def associate(
     if trust == FINAL:
         left_out |= not_found(recording, ids, used)
     remarks += describe_jumps(scene)
+    hidden = _hidden_edges(scene, recording, keyframes, (object_id, ids))
     return Association(
-        object_id, keyframes, scene, ids, dict(sorted(left_out.items())), tuple(remarks)
+        object_id, keyframes, scene, ids, dict(sorted(left_out.items())), hidden, tuple(remarks)
+    )
+
+
+def _hidden_edges(
+    scene: SceneMap, recording: Recording, keyframes: Ints, named: tuple[Ints, Ints]
+) -> Bools:
+    """Return which edges others seem to hide, (m, 4), from the ids of boxes and objects."""
+    object_id, ids = named
+    known = np.flatnonzero((ids >= 0) & scene.labels.takes_part[: len(ids)])
+    place = {int(ids[row]): number for number, row in enumerate(known.tolist())}
+    shown = np.array([place.get(one, -1) for one in object_id.tolist()], dtype=np.int64)
+    covariance = scene.box_noise.covariance(recording.detections.box, recording.camera)
+    return shortened_edges(
+        recording,
+        fill_in(recording, keyframes, scene.poses),
+        scene.ellipsoids[known],
+        shown,
+        np.diagonal(covariance, axis1=1, axis2=2),
     )
 
 
@@ -240,6 +263,7 @@ def _with_all_images(
         size_prior=scene.size_prior,
         step_noise=steps,
         levels=scene.levels,
+        minds_occlusion=scene.minds_occlusion,
     )
     everything.poses = fill_in(recording, keyframes, scene.poses)
     everything.ellipsoids = scene.ellipsoids.copy()

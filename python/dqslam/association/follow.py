@@ -185,6 +185,7 @@ def predict(scene: SceneMap, pose: int, object_rows: Ints, covariance: Floats) -
         scene.poses[pose],
         scene.ellipsoids[object_rows],
         covariance,
+        sees_hidden=scene.minds_occlusion,
     )
 
 
@@ -202,7 +203,7 @@ def choose(
         predicted,
         detections.box[rows],
         scene.box_covariance[rows],
-        detections.truncated[rows],
+        scene.cut_edges[rows],
         labels.class_probability(rows, shown),
     )
     own = labels.object_of_tracklet[labels.tracklets[rows]]

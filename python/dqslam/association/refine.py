@@ -109,6 +109,7 @@ def reassign(scene: SceneMap, switch_cost: float) -> None:
     )
     pairs = pairs[np.argsort(counts, kind="stable")]  # the most frequent comes last, and stays
     labels.object_of_tracklet[pairs[:, 0]] = pairs[:, 1]
+    scene.flag_hidden_edges()
 
 
 def assign_afterwards(

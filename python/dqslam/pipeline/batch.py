@@ -36,7 +36,10 @@ FEWEST_IMAGES_A_KEYFRAME = 3
 def estimate_batch(
     recording: Recording, options: RunOptions, progress: Progress
 ) -> EstimatorOutput:
-    """Find out which boxes show the same object, and estimate all of it together."""
+    """Find out which boxes show the same object, and estimate all of it together.
+
+    Edges that a nearer object may hide bound the object from one side only.
+    """
     found = associate(
         recording,
         trust=options.trust_ids,
@@ -46,6 +49,9 @@ def estimate_batch(
         estimates_noise=options.estimates_noise,
         progress=lambda share: progress(share, ""),
     )
+    seen = recording.detections
+    detections = replace(seen, truncated=seen.truncated | found.hidden)
+    recording = replace(recording, detections=detections)
     solver = options.solve_options()
     solver.schedule = _core.Schedule.BATCH
     estimate, marginals, summary, findings, final = _finish(recording, found, solver, options)
@@ -58,6 +64,7 @@ def estimate_batch(
         marginals,
         summary,
         object_id=found.object_id,
+        hidden=found.hidden,
         keyframes=len(found.keyframes if final is None else final.images),
         size_prior=scene.size_prior,
         box_noise=scene.box_noise if final is None else final.noise.total,

@@ -67,6 +67,8 @@ class EstimatorOutput:
     """What was noticed on the way, a sentence each."""
     calibration: tuple[CalibrationFinding, ...] = ()
     """What the boxes say about camera, mount and odometry."""
+    hidden: Bools | None = None
+    """Edges of each box that a nearer object may hide, shape (m, 4); None where not looked for."""
     live_poses: Floats | None = None
     """Of a session, before its last polish: world_from_robot, shape (n, d)."""
     step_ms: Floats | None = None
@@ -79,7 +81,8 @@ class RunResult:
 
     estimate: Estimate
     detections: Detections
-    """All boxes, with the ids of the objects that they show; -1 for none."""
+    """All boxes, with the ids of the objects that they show, -1 for none. Edges that a nearer
+    object may hide count as truncated, too."""
     held_out: Bools
     """Which boxes were kept from the estimator, shape (m,)."""
     marginals: Marginals | None
@@ -105,13 +108,16 @@ def conclude(
     estimate, noise = output.estimate, output.odometry_noise
     object_id = boxes.object_id.copy()
     object_id[~held_out] = output.object_id
+    truncated = boxes.truncated.copy()
+    if output.hidden is not None:
+        truncated[~held_out] |= output.hidden
     detections = detections_with_exact_boxes(
         estimate.camera,
         estimate.pose_model,
         estimate.poses,
         estimate.object_ids,
         estimate.ellipsoids,
-        replace(boxes, object_id=object_id),
+        replace(boxes, object_id=object_id, truncated=truncated),
     )
     assigned = detections.select((object_id >= 0) & ~held_out)
     chi2 = box_chi2(estimate, assigned, output.object_noise or output.box_noise)
