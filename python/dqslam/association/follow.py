@@ -176,7 +176,14 @@ def _depth_error(towards: Floats, covariance: Floats) -> float:
     return float(np.sqrt(max(variance, 0.0))) / float(towards @ towards)
 
 
-def predict(scene: SceneMap, pose: int, object_rows: Ints, covariance: Floats) -> PredictedBoxes:
+def predict(
+    scene: SceneMap,
+    pose: int,
+    object_rows: Ints,
+    covariance: Floats,
+    *,
+    sees_hidden: bool = False,
+) -> PredictedBoxes:
     """Return where objects are expected in the image of a pose, by places in ``object_rows``."""
     recording = scene.recording
     return predict_boxes(
@@ -185,7 +192,7 @@ def predict(scene: SceneMap, pose: int, object_rows: Ints, covariance: Floats) -
         scene.poses[pose],
         scene.ellipsoids[object_rows],
         covariance,
-        sees_hidden=scene.minds_occlusion,
+        sees_hidden=sees_hidden,
     )
 
 

@@ -15,6 +15,8 @@ CHI2_GATE = np.array([0.0, 6.63, 9.21, 11.34, 13.28])
 # The gate of an association holds 99.9 %: a step of odometry that errs by two sigmas moves all
 # boxes of an image at once, and a map that none of them is taken for is made again beside itself.
 GATE = np.array([0.0, 10.83, 13.82, 16.27, 18.47])
+# A box of which nearer objects may hide more edges shows too little to say what it is.
+MAX_HIDDEN_EDGES = 1
 # A detector confuses classes, so no class is impossible.
 CONFUSED = 0.02
 
@@ -128,16 +130,17 @@ def pair_costs(
     """Compare boxes (b, 4) with predicted ones: ``d^2 + ln |2 pi S| - 2 ln p(class)``.
 
     Edges that the image border cut take no part. On a box with such an edge, nor do those that the
-    object touches outside the image, unless it ends inside. An edge that may be hidden is not
-    compared where the box ends before it. ``class_probability`` (b, p) is that of
+    object touches outside the image, unless it ends inside. One edge that may be hidden
+    is not compared where the box ends before it. ``class_probability`` (b, p) is that of
     the box's class given the object. A box of something else may lie anywhere in the image and have
     any size up to half of it.
     """
     error = box[:, None] - predicted.box
     reaches = error * [-1.0, -1.0, 1.0, 1.0] < 0.0
     is_cut = np.asarray(truncated.any(axis=1))[:, None, None]
-    one_sided = (is_cut & predicted.out_of_sight) | predicted.hidden
-    ignored = truncated[:, None, :] | (one_sided & reaches)
+    behind = predicted.hidden & reaches
+    behind &= behind.sum(axis=2, keepdims=True) <= MAX_HIDDEN_EDGES
+    ignored = truncated[:, None, :] | (is_cut & predicted.out_of_sight & reaches) | behind
     error = np.where(ignored, 0.0, error)
     # An edge that is ignored: no error, and a variance that the determinant does not see.
     spread = predicted.covariance + box_covariance[:, None]
