@@ -18,6 +18,7 @@ from dqslam.association.labels import Labels
 from dqslam.association.noise import StepNoise
 from dqslam.association.occlusion import shortened_edges
 from dqslam.association.refine import reassign
+from dqslam.association.repeats import find_repeats
 from dqslam.association.scene_map import ANY_SIZE, SceneMap
 from dqslam.association.thinning import fill_in, thin_recording
 from dqslam.association.tracklets import link_tracklets
@@ -48,6 +49,8 @@ class Association:
     """Ids of objects that do not fit a world at rest, and why. Their boxes keep the ids."""
     hidden: Bools
     """Whether a nearer object seems to hide each edge of each box, shape (m, 4)."""
+    repeats: Bools
+    """Whether each box repeats a surer one of its image, whose object it has, shape (m,)."""
     remarks: tuple[str, ...] = ()
     """Sentences on attempts that were made, and on steps that are no noise."""
 
@@ -102,8 +105,9 @@ def associate(
 ) -> Association:
     """Find out which boxes show the same object.
 
-    Boxes are linked in the image to tracklets, and of a video the images from new viewpoints are
-    chosen. Along the path, the tracklets are given to the objects that they clearly show, by the
+    Of boxes that a detector drew twice on one thing in an image the surest counts, unless ids are
+    final. Boxes are linked in the image to tracklets, and of a video the images from new viewpoints
+    are chosen. Along the path, the tracklets are given to the objects that they clearly show, by the
     joint covariance of pose and object; objects start from tracklets, or from boxes that meet in
     space. With the whole path known, all boxes are assigned again. Relative positions take no part.
 
@@ -148,6 +152,11 @@ def associate(
         unnamed = tracker_ids < 0
         reject_rows("detections.object_id", unnamed, "final ids are needed: the box has none")
     recording = replace(recording, positions=None, measurements=())
+    counts = np.arange(len(tracker_ids)) if trust == FINAL else find_repeats(recording.detections)
+    single = counts == np.arange(len(counts))
+    if not single.all():
+        tracker_ids = tracker_ids[single]
+        recording = replace(recording, detections=recording.detections.select(single))
     tracklets = link_tracklets(recording, tracker_ids=tracker_ids)
     keyframes = choose_keyframes(recording, tracklets)
     used = np.isin(recording.detections.pose, keyframes)
@@ -190,8 +199,16 @@ def associate(
         left_out |= not_found(recording, ids, used)
     remarks += describe_jumps(scene)
     hidden = _hidden_edges(scene, recording, keyframes, (object_id, ids))
+    of_all = (np.cumsum(single) - 1)[counts]
     return Association(
-        object_id, keyframes, scene, ids, dict(sorted(left_out.items())), hidden, tuple(remarks)
+        object_id[of_all],
+        keyframes,
+        scene,
+        ids,
+        dict(sorted(left_out.items())),
+        hidden[of_all] & single[:, None],
+        ~single,
+        tuple(remarks),
     )
 
 
