@@ -107,9 +107,10 @@ def associate(
 
     Of boxes that a detector drew twice on one thing in an image the surest counts, unless ids are
     final. Boxes are linked in the image to tracklets, and of a video the images from new viewpoints
-    are chosen. Along the path, the tracklets are given to the objects that they clearly show, by the
-    joint covariance of pose and object; objects start from tracklets, or from boxes that meet in
-    space. With the whole path known, all boxes are assigned again. Relative positions take no part.
+    are chosen. Along the path, the tracklets are given to the objects that they clearly show, by
+    the joint covariance of pose and object; objects start from tracklets, or from boxes that meet
+    in space. With the whole path known, all boxes are assigned again. Relative positions take no
+    part.
 
     Parameters
     ----------

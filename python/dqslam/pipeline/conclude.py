@@ -18,6 +18,7 @@ from dqslam.io import Trajectory
 from dqslam.pipeline.hold_out import describe_overlap, overlap_with_map
 from dqslam.pipeline.lens import detections_with_exact_boxes
 from dqslam.pipeline.options import RunOptions
+from dqslam.pipeline.plausibility import find_doubtful
 from dqslam.pipeline.report import (
     box_chi2,
     describe_box_noise,
@@ -28,8 +29,8 @@ from dqslam.pipeline.report import (
     describe_times,
     warn_of_boxes,
     warn_of_calibration,
+    warn_of_doubtful,
     warn_of_evidence,
-    warn_of_sizes,
 )
 from dqslam.recording import Detections
 from dqslam.uncertainty import Marginals
@@ -119,6 +120,8 @@ def conclude(
         estimate.ellipsoids,
         replace(boxes, object_id=object_id, truncated=truncated),
     )
+    doubtful = find_doubtful(estimate, output.size_prior, output.marginals)
+    estimate = replace(estimate, doubtful=doubtful)
     assigned = detections.select((object_id >= 0) & ~held_out)
     chi2 = box_chi2(estimate, assigned, output.object_noise or output.box_noise)
     mapped = np.isin(assigned.object_id, estimate.object_ids)
@@ -135,7 +138,7 @@ def conclude(
             *output.remarks,
             *doubts,
             *warn_of_evidence(output.evidence),
-            *warn_of_sizes(estimate, output.size_prior),
+            *warn_of_doubtful(estimate),
             *warn_of_calibration(output.calibration),
         ],
         "doubts": doubts,
