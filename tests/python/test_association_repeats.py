@@ -7,7 +7,6 @@ import pytest
 
 from dqslam import Detections, Recording, RunOptions, associate, load_scenario, run, simulate
 from dqslam.association.repeats import find_repeats, repeats_in_image
-from dqslam.association.tracklets import link_tracklets
 from dqslam.metrics import box_iou
 
 OTHERWISE = 7
@@ -35,26 +34,6 @@ def test_a_box_repeats_only_one_that_counts():
     assert box_iou(box[0], box[1]) == pytest.approx(85 / 115)
     # The second repeats the first. So the third overlaps none that counts; the fourth repeats it.
     assert repeats_in_image(box).tolist() == [0, 0, 2, 2]
-
-
-def test_boxes_are_linked_under_another_name_only_where_they_are_expected():
-    recording, _ = simulate(load_scenario("orbit"), seed=0)
-    poses = [0, 1, 2, 3, 4]
-    box = [[100, 100, 200, 200]] * 3 + [[150, 100, 250, 200]] + [[100, 100, 200, 200]]
-    names = [0, OTHERWISE, 0, OTHERWISE, 0]
-    still = replace(
-        recording,
-        timestamps=recording.timestamps[:5],
-        odometry=replace(
-            recording.odometry,
-            relative=np.tile([0.0, 0, 0, 0, 0, 0, 1], (4, 1)),
-            covariance=recording.odometry.covariance[:4],
-        ),
-        detections=drawn(poses, box, [1.0] * 5, names),
-        positions=None,
-    )
-    # The fourth has moved by half of its side, and is called otherwise: it is another thing.
-    assert link_tracklets(still).tolist() == [0, 0, 0, 1, 0]
 
 
 def orbit(seed):

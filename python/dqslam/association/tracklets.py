@@ -23,8 +23,6 @@ MIN_OVERLAP = 0.3
 # around, and it is by this factor larger or smaller at most.
 MAX_SIDES_AWAY = 1.0
 MAX_GROWTH = 1.6
-# What is called something else in the next image overlaps by at least this: nothing else is there.
-MIN_OVERLAP_OF_CLASSES = 0.7
 # A track that is not seen again within so many images is lost: its prediction is worth nothing.
 MAX_IMAGES_UNSEEN = 5
 
@@ -87,11 +85,8 @@ class Linker:
         predicted = _predict(self._tracks, pose, camera, self._camera)
         own = [(track.class_id, track.tracker_id) for track in self._tracks]
         new = np.column_stack([class_id, tracker_ids])
-        alike = np.array(own).reshape(-1, 1, 2) == new
-        allowed = alike.all(axis=2)
-        pairs = _match(predicted, box, allowed)
-        pairs += _called_otherwise(pairs, predicted, box, alike[:, :, 1] & ~allowed)
-        for i, j in pairs:
+        allowed = (np.array(own).reshape(-1, 1, 2) == new).all(axis=2)
+        for i, j in _match(predicted, box, allowed):
             self._tracks[i].follow(pose, camera, box[j], predicted[i])
             tracklet[j] = self._tracks[i].number
         for j in np.flatnonzero(tracklet < 0).tolist():
@@ -172,25 +167,6 @@ def _match(predicted: Floats, box: Floats, allowed: Bools) -> list[tuple[int, in
         if overlap[i, j] >= MIN_OVERLAP
     ]
     return pairs + _only_choices(pairs, predicted, box, allowed)
-
-
-def _called_otherwise(
-    pairs: list[tuple[int, int]], predicted: Floats, box: Floats, allowed: Bools
-) -> list[tuple[int, int]]:
-    """Pair what is left of other classes where a box is nearly the one that is expected."""
-    tracks, boxes = (
-        np.setdiff1d(np.arange(n), part)
-        for n, part in ((len(predicted), [i for i, _ in pairs]), (len(box), [j for _, j in pairs]))
-    )
-    if not tracks.size or not boxes.size:
-        return []
-    overlap = box_iou(predicted[tracks][:, None], box[boxes])
-    overlap = np.where(allowed[np.ix_(tracks, boxes)], overlap, 0.0)
-    return [
-        (int(tracks[i]), int(boxes[j]))
-        for i, j in np.argwhere(overlap >= MIN_OVERLAP_OF_CLASSES)
-        if overlap[i, j] == overlap[i].max() == overlap[:, j].max()
-    ]
 
 
 def _only_choices(
