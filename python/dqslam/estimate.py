@@ -54,6 +54,8 @@ class Estimate:
     """Whether the chi-square of each box is at most `outlier_chi_square`, shape (b,)."""
     dropped: Mapping[int, str] = field(default_factory=dict)
     """Reasons why objects are not in the map, by id."""
+    doubtful: Mapping[int, str] = field(default_factory=dict)
+    """Reasons why the size or shape of an object in the map is not to be believed, by id."""
 
     def __repr__(self) -> str:
         """Show the pose model, and how many poses and objects there are."""

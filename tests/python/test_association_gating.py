@@ -88,6 +88,7 @@ def test_a_cost_by_hand():
         box=np.array([[100.0, 100.0, 140.0, 160.0]]),
         covariance=np.diag([5.0, 5.0, 7.0, 7.0])[None],
         out_of_sight=np.zeros((1, 4), dtype=bool),
+        hidden=np.zeros((1, 4), dtype=bool),
     )
     cost = costs(predicted, [103.0, 100.0, 140.0, 156.0], probability=0.5)
     d2 = 3.0**2 / 9.0 + 4.0**2 / 16.0

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from dqslam import _core
-from dqslam.assumptions import BoxNoise, OdometryNoise, SizePrior, SizePriors
+from dqslam.assumptions import BoxNoise, OdometryNoise
 from dqslam.io import Trajectory, load_recording
 from dqslam.pipeline import RunOptions, run
-from dqslam.pipeline.report import box_chi2, describe_evidence, warn_of_evidence, warn_of_sizes
+from dqslam.pipeline.report import box_chi2, describe_evidence, warn_of_evidence
 from dqslam.simulation import perturb_odometry
 from orbit import make_orbit, write_orbit
 
@@ -133,19 +133,3 @@ def test_each_object_may_have_a_noise_of_its_own(files):
     row = np.searchsorted(estimate.object_ids, recording.detections.object_id).clip(max=count - 1)
     fits = np.isfinite(same)
     np.testing.assert_allclose(own[fits], same[fits] / (1.0 + row[fits]) ** 2)
-
-
-def test_an_object_of_an_odd_size_is_named(files):
-    recording, _ = load_recording(*files)
-    estimate = run(recording, RunOptions(mode=_core.Mode.MAPPING)).estimate
-    usual = SizePrior(float(np.log(0.1)), 0.7)
-    assert warn_of_sizes(estimate, usual) == []
-    odd = estimate.ellipsoids.copy()
-    turn = np.array([0.0, 0.0, 0.0, 1.0])
-    odd[1] = _core.ellipsoid_from_axes(odd[1, :3], np.array([1.8, 0.065, 0.06]), turn)
-    (warning,) = warn_of_sizes(replace(estimate, ellipsoids=odd), usual)
-    name = f"object {estimate.object_ids[1]} ({estimate.class_names[1]})"
-    assert warning.startswith(f"{name} is 3.6 x 0.13 x 0.12 m, where 0.2 m is usual")
-    # What is known of its class makes it usual.
-    known = SizePriors({estimate.class_names[1]: SizePrior(float(np.log(0.3)), 1.0)}, usual)
-    assert warn_of_sizes(replace(estimate, ellipsoids=odd), known) == []

@@ -86,7 +86,8 @@ def estimate_all_images(
 
     Returns
     -------
-    The estimate; None where there are too many images, or an object reaches a camera.
+    The estimate; None where there are too many images, an object reaches a camera, or its boxes
+    leave it open.
     """
     detections, model = recording.detections, recording.odometry.pose_model
     images = _choose_images(keyframes, detections.pose, object_row)
@@ -108,6 +109,10 @@ def estimate_all_images(
         return None
     if found is None:
         return None
+    try:
+        covariance = np.asarray(np.linalg.inv(found.hessian), dtype=np.float64)
+    except np.linalg.LinAlgError:  # what its boxes say leaves an object open
+        return None
     gain = gain_over_odometry(problem, found, believed.boxes)
     ends = found.state
     if not earns_it(gain):
@@ -123,7 +128,6 @@ def estimate_all_images(
             found,
             believed.boxes,
         )
-    covariance = np.asarray(np.linalg.inv(found.hessian), dtype=np.float64)
     k, count = problem.k, len(images)
     covariance = np.asarray(np.pad(covariance, ((k, 0), (k, 0))))  # the first pose is exact
     return FinalEstimate(

@@ -16,7 +16,9 @@ from dqslam.association.initiation import MIN_VIEWS
 from dqslam.association.keyframes import choose_keyframes
 from dqslam.association.labels import Labels
 from dqslam.association.noise import StepNoise
+from dqslam.association.occlusion import shortened_edges
 from dqslam.association.refine import reassign
+from dqslam.association.repeats import find_repeats
 from dqslam.association.scene_map import ANY_SIZE, SceneMap
 from dqslam.association.thinning import fill_in, thin_recording
 from dqslam.association.tracklets import link_tracklets
@@ -45,6 +47,10 @@ class Association:
     """Ids of the objects, -1 for one that was given up, shape (o,)."""
     left_out: dict[int, str]
     """Ids of objects that do not fit a world at rest, and why. Their boxes keep the ids."""
+    hidden: Bools
+    """Whether a nearer object seems to hide each edge of each box, shape (m, 4)."""
+    repeats: Bools
+    """Whether each box repeats a surer one of its image, whose object it has, shape (m,)."""
     remarks: tuple[str, ...] = ()
     """Sentences on attempts that were made, and on steps that are no noise."""
 
@@ -99,10 +105,12 @@ def associate(
 ) -> Association:
     """Find out which boxes show the same object.
 
-    Boxes are linked in the image to tracklets, and of a video the images from new viewpoints are
-    chosen. Along the path, the tracklets are given to the objects that they clearly show, by the
-    joint covariance of pose and object; objects start from tracklets, or from boxes that meet in
-    space. With the whole path known, all boxes are assigned again. Relative positions take no part.
+    Of boxes that a detector drew twice on one thing in an image the surest counts, unless ids are
+    final. Boxes are linked in the image to tracklets, and of a video the images from new viewpoints
+    are chosen. Along the path, the tracklets are given to the objects that they clearly show, by
+    the joint covariance of pose and object; objects start from tracklets, or from boxes that meet
+    in space. With the whole path known, all boxes are assigned again. Relative positions take no
+    part.
 
     Parameters
     ----------
@@ -145,6 +153,11 @@ def associate(
         unnamed = tracker_ids < 0
         reject_rows("detections.object_id", unnamed, "final ids are needed: the box has none")
     recording = replace(recording, positions=None, measurements=())
+    counts = np.arange(len(tracker_ids)) if trust == FINAL else find_repeats(recording.detections)
+    single = counts == np.arange(len(counts))
+    if not single.all():
+        tracker_ids = tracker_ids[single]
+        recording = replace(recording, detections=recording.detections.select(single))
     tracklets = link_tracklets(recording, tracker_ids=tracker_ids)
     keyframes = choose_keyframes(recording, tracklets)
     used = np.isin(recording.detections.pose, keyframes)
@@ -167,6 +180,7 @@ def associate(
             step_noise=noise,
             levels=None if levels is None else raised * levels,
             mode=mode,
+            minds_occlusion=True,
         )
 
     attempt, remarks = make_map(make_scene, trust, progress)
@@ -185,8 +199,35 @@ def associate(
     if trust == FINAL:
         left_out |= not_found(recording, ids, used)
     remarks += describe_jumps(scene)
+    hidden = _hidden_edges(scene, recording, keyframes, (object_id, ids))
+    of_all = (np.cumsum(single) - 1)[counts]
     return Association(
-        object_id, keyframes, scene, ids, dict(sorted(left_out.items())), tuple(remarks)
+        object_id[of_all],
+        keyframes,
+        scene,
+        ids,
+        dict(sorted(left_out.items())),
+        hidden[of_all] & single[:, None],
+        ~single,
+        tuple(remarks),
+    )
+
+
+def _hidden_edges(
+    scene: SceneMap, recording: Recording, keyframes: Ints, named: tuple[Ints, Ints]
+) -> Bools:
+    """Return which edges others seem to hide, (m, 4), from the ids of boxes and objects."""
+    object_id, ids = named
+    known = np.flatnonzero((ids >= 0) & scene.labels.takes_part[: len(ids)])
+    place = {int(ids[row]): number for number, row in enumerate(known.tolist())}
+    shown = np.array([place.get(one, -1) for one in object_id.tolist()], dtype=np.int64)
+    covariance = scene.box_noise.covariance(recording.detections.box, recording.camera)
+    return shortened_edges(
+        recording,
+        fill_in(recording, keyframes, scene.poses),
+        scene.ellipsoids[known],
+        shown,
+        np.diagonal(covariance, axis1=1, axis2=2),
     )
 
 
@@ -240,6 +281,7 @@ def _with_all_images(
         size_prior=scene.size_prior,
         step_noise=steps,
         levels=scene.levels,
+        minds_occlusion=scene.minds_occlusion,
     )
     everything.poses = fill_in(recording, keyframes, scene.poses)
     everything.ellipsoids = scene.ellipsoids.copy()

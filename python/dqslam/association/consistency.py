@@ -17,6 +17,10 @@ DUPLICATE_MAX_CHI2 = 11.34
 DUPLICATE_CENTER_SIGMA = 0.3
 # Only centers nearer than so many times the sum of their sizes are compared: it costs a covariance.
 DUPLICATE_MAX_SIZES_APART = 4.0
+# Of two classes, only what is in one place and as large is one: nearer than this part of the
+# smaller size, and larger by this factor at most.
+RENAMED_MAX_SIZES_APART = 0.5
+RENAMED_MAX_SIZE_FACTOR = 1.5
 # Two boxes on one thing are a detector's mistake in at most this share of the rarer one's images.
 DUPLICATE_MAX_SEEN_TOGETHER = 0.1
 
@@ -49,7 +53,7 @@ SCATTERED_MAX_SHARE = 0.5
 
 
 def join_duplicates(scene: SceneMap) -> None:
-    """Join objects of one class that may be in one place and are never seen together."""
+    """Join objects that may be in one place and are never seen together."""
     labels = scene.labels
     pairs = close_pairs(scene)
     if not pairs:
@@ -74,7 +78,10 @@ def join_duplicates(scene: SceneMap) -> None:
 
 
 def close_pairs(scene: SceneMap) -> list[tuple[ObjectRow, ObjectRow]]:
-    """Return pairs of one class, a few sizes apart at most, that are not seen together."""
+    """Return pairs of one class, a few sizes apart at most, that are not seen together.
+
+    Of two classes, pairs in the same place: detectors confuse classes.
+    """
     labels = scene.labels
     alive = np.flatnonzero(labels.box_counts > 0)
     alive = alive[labels.takes_part[alive]]
@@ -85,7 +92,10 @@ def close_pairs(scene: SceneMap) -> list[tuple[ObjectRow, ObjectRow]]:
     called = labels.votes[alive].argmax(axis=1)
     distance = np.linalg.norm(center[:, None] - center, axis=2)
     near = distance < DUPLICATE_MAX_SIZES_APART * (size[:, None] + size)
-    near &= called[:, None] == called
+    smaller, ratio = np.minimum(size[:, None], size), np.abs(np.log(size[:, None] / size))
+    renamed = distance < RENAMED_MAX_SIZES_APART * smaller
+    renamed &= ratio < np.log(RENAMED_MAX_SIZE_FACTOR)
+    near &= (called[:, None] == called) | renamed
     pairs = alive[np.argwhere(np.triu(near, 1))].tolist()
     return [(a, b) for a, b in pairs if not _are_seen_together(scene, a, b)]
 

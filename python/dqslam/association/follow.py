@@ -177,7 +177,14 @@ def _depth_error(towards: Floats, covariance: Floats) -> float:
     return float(np.sqrt(max(variance, 0.0))) / float(towards @ towards)
 
 
-def predict(scene: SceneMap, pose: int, object_rows: Ints, covariance: Floats) -> PredictedBoxes:
+def predict(
+    scene: SceneMap,
+    pose: int,
+    object_rows: Ints,
+    covariance: Floats,
+    *,
+    sees_hidden: bool = False,
+) -> PredictedBoxes:
     """Return where objects are expected in the image of a pose, by places in ``object_rows``."""
     recording = scene.recording
     return predict_boxes(
@@ -186,6 +193,7 @@ def predict(scene: SceneMap, pose: int, object_rows: Ints, covariance: Floats) -
         scene.poses[pose],
         scene.ellipsoids[object_rows],
         covariance,
+        sees_hidden=sees_hidden,
     )
 
 
@@ -203,7 +211,7 @@ def choose(
         predicted,
         detections.box[rows],
         scene.box_covariance[rows],
-        detections.truncated[rows],
+        scene.cut_edges[rows],
         labels.class_probability(rows, shown),
     )
     own = labels.object_of_tracklet[labels.tracklets[rows]]

@@ -8,12 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dqslam import _core
+from dqslam.association.occlusion import hidden_edges
 
 # 99 % of the boxes of an object that is where the map says lie below this, by edges that count.
 CHI2_GATE = np.array([0.0, 6.63, 9.21, 11.34, 13.28])
 # The gate of an association holds 99.9 %: a step of odometry that errs by two sigmas moves all
 # boxes of an image at once, and a map that none of them is taken for is made again beside itself.
 GATE = np.array([0.0, 10.83, 13.82, 16.27, 18.47])
+# A box of which nearer objects may hide more edges shows too little to say what it is.
+MAX_HIDDEN_EDGES = 1
 # A detector confuses classes, so no class is impossible.
 CONFUSED = 0.02
 
@@ -30,12 +33,18 @@ class PredictedBoxes:
     """Of pose and object together, without the detector's noise, pixels^2, shape (p, 4, 4)."""
     out_of_sight: NDArray[np.bool_]
     """Edges that the object touches outside the image, shape (p, 4)."""
+    hidden: NDArray[np.bool_]
+    """Edges that a nearer object may hide, shape (p, 4)."""
 
     def without(self, objects: NDArray[np.bool_]) -> PredictedBoxes:
         """Leave out some objects: a flag for each that ``object_row`` may name."""
         kept = ~objects[self.object_row]
         return PredictedBoxes(
-            self.object_row[kept], self.box[kept], self.covariance[kept], self.out_of_sight[kept]
+            self.object_row[kept],
+            self.box[kept],
+            self.covariance[kept],
+            self.out_of_sight[kept],
+            self.hidden[kept],
         )
 
 
@@ -45,10 +54,13 @@ def predict_boxes(
     pose: NDArray[np.float64],
     ellipsoids: NDArray[np.float64],
     covariance: NDArray[np.float64],
+    *,
+    sees_hidden: bool = False,
 ) -> PredictedBoxes:
     """Project objects (o, 9) into the image of a pose (d,).
 
     ``covariance`` is that of the pose's tangent and all ellipsoids, jointly: (k + 9 o, k + 9 o).
+    With ``sees_hidden``, edges are flagged that a nearer one of these objects may hide.
     """
     here = np.repeat(pose[None], len(ellipsoids), axis=0)
     box, in_front, jacobian = _core.differentiate_boxes(pose_model, camera, here, ellipsoids)
@@ -65,7 +77,10 @@ def predict_boxes(
         known = np.trace(spread, axis1=1, axis2=2) < size**2  # false where it is not a number
     row = row[known]
     out_of_sight = _core.edges_out_of_sight(pose_model, camera, here[row], ellipsoids[row])
-    return PredictedBoxes(row, box[row], spread[known], out_of_sight)
+    hidden = np.zeros((len(row), 4), dtype=np.bool_)
+    if sees_hidden:
+        hidden = hidden_edges(camera, pose_model, pose[None], ellipsoids[row])[0]
+    return PredictedBoxes(row, box[row], spread[known], out_of_sight, hidden)
 
 
 def in_image(
@@ -115,14 +130,17 @@ def pair_costs(
     """Compare boxes (b, 4) with predicted ones: ``d^2 + ln |2 pi S| - 2 ln p(class)``.
 
     Edges that the image border cut take no part. On a box with such an edge, nor do those that the
-    object touches outside the image, unless it ends inside. ``class_probability`` (b, p) is that of
+    object touches outside the image, unless it ends inside. One edge that may be hidden
+    is not compared where the box ends before it. ``class_probability`` (b, p) is that of
     the box's class given the object. A box of something else may lie anywhere in the image and have
     any size up to half of it.
     """
     error = box[:, None] - predicted.box
     reaches = error * [-1.0, -1.0, 1.0, 1.0] < 0.0
     is_cut = np.asarray(truncated.any(axis=1))[:, None, None]
-    ignored = truncated[:, None, :] | (is_cut & predicted.out_of_sight & reaches)
+    behind = predicted.hidden & reaches
+    behind &= behind.sum(axis=2, keepdims=True) <= MAX_HIDDEN_EDGES
+    ignored = truncated[:, None, :] | (is_cut & predicted.out_of_sight & reaches) | behind
     error = np.where(ignored, 0.0, error)
     # An edge that is ignored: no error, and a variance that the determinant does not see.
     spread = predicted.covariance + box_covariance[:, None]

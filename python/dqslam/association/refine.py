@@ -109,6 +109,7 @@ def reassign(scene: SceneMap, switch_cost: float) -> None:
     )
     pairs = pairs[np.argsort(counts, kind="stable")]  # the most frequent comes last, and stays
     labels.object_of_tracklet[pairs[:, 0]] = pairs[:, 1]
+    scene.flag_hidden_edges()
 
 
 def assign_afterwards(
@@ -116,10 +117,11 @@ def assign_afterwards(
 ) -> Ints:
     """Return the objects that the boxes of an image show, -1 for none, shape (b,).
 
-    The path and the objects have been fitted to these very boxes: they count as certain.
+    The path and the objects have been fitted to these very boxes: they count as certain, also in
+    which of them hides another, where that is minded.
     """
     k = scene.recording.odometry.covariance.shape[1]
     certain = np.zeros((k + 9 * len(object_rows),) * 2)
-    predicted = predict(scene, pose, object_rows, certain)
+    predicted = predict(scene, pose, object_rows, certain, sees_hidden=scene.minds_occlusion)
     choice, margin = choose(scene, rows, object_rows, predicted, switch_cost)
     return np.where(margin >= MIN_MARGIN_AFTERWARDS, choice, -1)

@@ -14,6 +14,7 @@ from dqslam.association.box_levels import corrected_boxes, within_limits
 from dqslam.association.gating import GATE
 from dqslam.association.labels import Labels
 from dqslam.association.noise import StepNoise, corrected
+from dqslam.association.occlusion import shortened_edges
 from dqslam.assumptions import BoxNoise, OdometryNoise, SizePrior, SizePriors
 from dqslam.graph import Graph, build_graph
 from dqslam.lens import edge_scales
@@ -44,6 +45,7 @@ class SceneMap:
         step_noise: StepNoise | None = None,
         levels: Floats | None = None,
         mode: _core.Mode = _core.Mode.SLAM,
+        minds_occlusion: bool = False,
     ) -> None:
         """Start at the first pose, without objects.
 
@@ -58,10 +60,15 @@ class SceneMap:
             its components are estimated, from ``levels`` on, shape (c,).
         mode
             MAPPING takes the odometry for the truth.
+        minds_occlusion
+            Whether an edge of a box that a nearer object may hide is taken for one-sided.
         """
         detections = recording.detections
         self.recording = recording
         self.labels = labels
+        self.minds_occlusion = minds_occlusion
+        self.cut_edges = detections.truncated
+        """Edges that the border of the image cuts, shape (m, 4)."""
         self.class_names = [name for _, name in sorted(detections.class_names.items())]
         """By columns of the labels' votes."""
         self.observation_rows: Ints = np.arange(len(detections))
@@ -100,6 +107,28 @@ class SceneMap:
         if self.learns_size and len(object_rows) >= MIN_OBJECTS_TO_LEARN_SIZE:
             log_size = float(np.median(self.log_sizes()[object_rows]))
             self.size_prior = SizePrior(log_mean=log_size, log_sigma=LEARNED_LOG_SIZE_SIGMA)
+
+    def flag_hidden_edges(self) -> None:
+        """Take edges that a nearer object seems to hide for one-sided, if that is minded.
+
+        Only objects that take part hide others.
+        """
+        if not self.minds_occlusion:
+            return
+        recording, shown = self.recording, self.labels.object_rows
+        known = np.flatnonzero((self.labels.box_counts > 0) & self.labels.takes_part[:-1])
+        place = np.append(np.full(len(self.ellipsoids), -1), -1)
+        place[known] = np.arange(len(known))
+        seen = np.where(recording.detections.pose < len(self.poses), place[shown], -1)
+        hidden = shortened_edges(
+            recording,
+            self.poses,
+            self.ellipsoids[known],
+            seen,
+            np.diagonal(self.box_covariance, axis1=1, axis2=2),
+        )
+        detections = replace(recording.detections, truncated=self.cut_edges | hidden)
+        self.recording = replace(recording, detections=detections)
 
     # ---- estimates
 

@@ -13,6 +13,8 @@ def show_report(output: Output, report: dict[str, Any]) -> None:
     output.table(_overview(report))
     if report["objects"]:
         output.table(_objects(report["objects"]))
+        if any(entry["doubt"] is not None for entry in report["objects"]):
+            output.line("? the size or shape is not to be believed: see the warnings")
     lines = [f"object {name} is not in the map: {why}" for name, why in _dropped(report)]
     lines += [f"under-constrained: {sentence}" for sentence in report["under_constrained"]]
     if report["solver"] is None:
@@ -138,7 +140,7 @@ def _objects(objects: list[dict[str, Any]]) -> "Table":
     for entry in objects:
         sigma, axes = entry["center_sigma_m"], entry["semi_axes_m"]
         table.add_row(
-            str(entry["id"]),
+            str(entry["id"]) if entry["doubt"] is None else f"{entry['id']} ?",
             escape(entry["class_name"]),
             str(entry["observations"]),
             " ".join(f"{value:.3g}" for value in entry["center_m"]),

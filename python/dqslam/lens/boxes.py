@@ -24,9 +24,11 @@ from dqslam.lens.camera import differentiate_pixels, ideal_pixels, recorded_pixe
 
 # Points of an outline among which the touching points are looked for.
 _POINTS = 24
-# Rounds of Newton's method for a touching point, each with a step for its second derivative.
+# Rounds of Newton's method for a touching point, each with a step for its second derivative; it is
+# found when its angle moves by less, for the edge depends on the square of that.
 _ROUNDS = 3
 _STEP = 1e-5
+_FOUND = 1e-6
 # Rounds for a box; from the start used here, four or five reach the accuracy [px].
 _BOX_ROUNDS = 40
 _ACCURACY = 1e-8
@@ -76,20 +78,21 @@ def distorted_or_nan(camera: _core.Camera, undistorted: Floats, tilt: ArrayLike 
     tilts = _given_tilts(tilt, len(undistorted)).copy()
     rows = np.flatnonzero(np.isnan(tilts))
     tilts[rows] = 0.0
-    recorded, _, _ = _recorded(camera, undistorted, tilts)
+    recorded, _, _, touching = _recorded(camera, undistorted, tilts)
+    touching = touching[rows]
     slope = _straight_slopes(camera, recorded[rows])
     for _ in range(_BOX_ROUNDS):
         if not rows.size:
             break
         # The tilt depends on the recorded box, and this on the tilt: Newton's method.
         tilts[rows] = _straight_tilts(camera, recorded[rows])
-        after, _, by_tilt = _recorded(camera, undistorted[rows], tilts[rows])
+        after, _, by_tilt, touching = _recorded(camera, undistorted[rows], tilts[rows], touching)
         change = after - recorded[rows]
         with np.errstate(invalid="ignore", divide="ignore"):
             along = np.sum(slope * change, axis=1) / (1 - np.sum(slope * by_tilt, axis=1))
         recorded[rows] += change + along[:, None] * by_tilt
         left = np.abs(change).max(axis=1, initial=0.0) > _ACCURACY  # false for NaN
-        rows, slope = rows[left], slope[left]
+        rows, slope, touching = rows[left], slope[left], touching[left]
     recorded[np.isnan(recorded).any(axis=1)] = np.nan
     recorded[rows] = np.nan
     return recorded
@@ -102,13 +105,15 @@ def undistorted_or_nan(camera: _core.Camera, recorded: Floats, tilt: ArrayLike =
     box = _start(camera, recorded)
     found = np.full_like(box, np.nan)
     rows = np.flatnonzero(np.isfinite(box).all(axis=1) & np.isfinite(tilts))
+    touching = None
     for _ in range(_BOX_ROUNDS):
-        now, jacobian, _ = _recorded(camera, box[rows], tilts[rows])
+        now, jacobian, _, touching = _recorded(camera, box[rows], tilts[rows], touching)
         known = np.isfinite(now).all(axis=1)
         rows, error, jacobian = rows[known], (recorded[rows] - now)[known], jacobian[known]
         done = np.abs(error).max(axis=1, initial=0.0) < _ACCURACY
         found[rows[done]] = box[rows[done]]
         rows, error, jacobian = rows[~done], error[~done], jacobian[~done]
+        touching = touching[known][~done]
         if not rows.size:
             break
         change = np.linalg.solve(jacobian, error[..., None])[..., 0]
@@ -200,21 +205,27 @@ def _points(boxes: Floats, tilts: Floats, angles: Floats) -> tuple[Floats, Float
     return middle[:, None] + half[:, None] * unit, half[:, None] * slope
 
 
-def _touching(camera: _core.Camera, boxes: Floats, tilts: Floats) -> Floats:
-    """Return the angles (m, 4) at which recorded edges touch the outlines."""
+def _touching(
+    camera: _core.Camera, boxes: Floats, tilts: Floats, near: Floats | None = None
+) -> Floats:
+    """Return the angles (m, 4) at which recorded edges touch the outlines, from some ``near``."""
     angle = np.linspace(0.0, 2 * np.pi, _POINTS, endpoint=False)
-    points, _ = _points(boxes, tilts, np.tile(angle, (len(boxes), 1)))
-    recorded = np.tile(recorded_pixels(camera, points), (1, 1, 2)) * _SIGNS
-    best = np.where(np.isnan(recorded), -np.inf, recorded).argmax(axis=1)
-    angles: Floats = angle[best]
     farthest = angle[1]  # the extreme is next to the best of the points
+    angles = near
+    if angles is None:
+        points, _ = _points(boxes, tilts, np.tile(angle, (len(boxes), 1)))
+        recorded = np.tile(recorded_pixels(camera, points), (1, 1, 2)) * _SIGNS
+        angles = angle[np.where(np.isnan(recorded), -np.inf, recorded).argmax(axis=1)]
     for _ in range(_ROUNDS):
         slope, after = (_slopes(camera, boxes, tilts, angles + step) for step in (0.0, _STEP))
         with np.errstate(invalid="ignore", divide="ignore"):
             newton = -slope * _STEP / (after - slope)
         uphill = np.sign(slope) * farthest
         change = np.where(after < slope, np.clip(newton, -farthest, farthest), uphill)
-        angles = angles + np.nan_to_num(change)
+        change = np.nan_to_num(change)
+        angles = angles + change
+        if np.abs(change).max(initial=0.0) < _FOUND:
+            break
     return angles
 
 
@@ -234,16 +245,19 @@ def _edges(
     return recorded[:, edge, edge % 2], jacobian[:, edge, edge % 2], along
 
 
-def _recorded(camera: _core.Camera, boxes: Floats, tilts: Floats) -> tuple[Floats, Floats, Floats]:
+def _recorded(
+    camera: _core.Camera, boxes: Floats, tilts: Floats, near: Floats | None = None
+) -> tuple[Floats, Floats, Floats, Floats]:
     """Return recorded boxes (m, 4), and their derivatives by boxes (m, 4, 4) and tilts (m, 4).
 
+    Also the angles (m, 4) at which edges touch the outline, which are near those that are given.
     An edge is an extreme of the outline, so that only the outline's motion at the touching point
     counts, and not that of the point along it.
     """
-    touching = _touching(camera, boxes, tilts)
+    touching = _touching(camera, boxes, tilts, near)
     unit, _ = _points(np.tile([-1.0, -1.0, 1.0, 1.0], (len(boxes), 1)), tilts, touching)
     recorded, gradient, _ = _edges(camera, boxes, tilts, touching)
     low, high = 0.5 * gradient * (1 - unit), 0.5 * gradient * (1 + unit)
     turn = np.cos(touching) - (tilts / np.sqrt(1 - tilts**2))[:, None] * np.sin(touching)
     by_tilt = gradient[..., 1] * turn * 0.5 * (boxes[:, 3] - boxes[:, 1])[:, None]
-    return recorded, np.concatenate([low, high], axis=-1), by_tilt
+    return recorded, np.concatenate([low, high], axis=-1), by_tilt, touching

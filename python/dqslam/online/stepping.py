@@ -13,6 +13,7 @@ from dqslam._checks import Floats
 from dqslam._files import uninterrupted
 from dqslam._ids import ObjectId, ObjectRow
 from dqslam.association.noise import translation_axes
+from dqslam.association.repeats import repeats_in_image
 from dqslam.online.identify import Identifier
 from dqslam.online.inputs import (
     CheckedBoxes,
@@ -137,12 +138,17 @@ def _take_step(
     object_rows = prepared.object_rows
     waiting = np.flatnonzero(object_rows < 0)
     if waiting.size:
-        observation_rows = report.first_observation + waiting
+        # Of boxes that were drawn twice on one thing, the first counts; the others wait for good.
+        counts = repeats_in_image(step.boxes.box[waiting])
+        single = np.unique(counts)
+        observation_rows = report.first_observation + waiting[single]
         # What overflows after a jump over the globe is not determined, and compares as false.
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            found = identifier.identify(step.boxes, waiting, observation_rows)
-        object_rows[waiting] = found
-        state.shown = np.array([*registry.ids, -1], dtype=np.int64)[object_rows]
+            found = identifier.identify(step.boxes, waiting[single], observation_rows)
+        object_rows[waiting[single]] = found
+        shown = object_rows.copy()
+        shown[waiting] = object_rows[waiting[counts]]
+        state.shown = np.array([*registry.ids, -1], dtype=np.int64)[shown]
     return report
 
 

@@ -36,7 +36,10 @@ FEWEST_IMAGES_A_KEYFRAME = 3
 def estimate_batch(
     recording: Recording, options: RunOptions, progress: Progress
 ) -> EstimatorOutput:
-    """Find out which boxes show the same object, and estimate all of it together."""
+    """Find out which boxes show the same object, and estimate all of it together.
+
+    Edges that a nearer object may hide bound the object from one side only.
+    """
     found = associate(
         recording,
         trust=options.trust_ids,
@@ -46,6 +49,9 @@ def estimate_batch(
         estimates_noise=options.estimates_noise,
         progress=lambda share: progress(share, ""),
     )
+    seen = recording.detections
+    detections = replace(seen, truncated=seen.truncated | found.hidden)
+    recording = replace(recording, detections=detections)
     solver = options.solve_options()
     solver.schedule = _core.Schedule.BATCH
     estimate, marginals, summary, findings, final = _finish(recording, found, solver, options)
@@ -58,6 +64,7 @@ def estimate_batch(
         marginals,
         summary,
         object_id=found.object_id,
+        hidden=found.hidden,
         keyframes=len(found.keyframes if final is None else final.images),
         size_prior=scene.size_prior,
         box_noise=scene.box_noise if final is None else final.noise.total,
@@ -101,7 +108,8 @@ def _finish(
     if not order.size:
         return nothing, None, None, (), None
     marginals = marginal_covariances(graph, solved, solver)
-    boxes = dict(zip(*np.unique(found.object_id, return_counts=True), strict=True))
+    counted = found.object_id[~found.repeats]
+    boxes = dict(zip(*np.unique(counted, return_counts=True), strict=True))
     estimate = replace(
         nothing,
         poses=fill_in(recording, found.keyframes, solved.poses),
@@ -150,13 +158,14 @@ def _use_all_images(
     None where that has little to add, and where boxes come through a lens: these are exact only in
     the problem of the keyframes.
     """
-    images = np.unique(recording.detections.pose[found.object_id >= 0])
+    object_id = np.where(found.repeats, -1, found.object_id)
+    images = np.unique(recording.detections.pose[object_id >= 0])
     few = len(images) < FEWEST_IMAGES_A_KEYFRAME * len(found.keyframes)
     if few or recording.camera.has_distortion:
         return None
-    place = np.searchsorted(estimate.object_ids, found.object_id)
+    place = np.searchsorted(estimate.object_ids, object_id)
     place = place.clip(max=len(estimate.object_ids) - 1)
-    mapped = estimate.object_ids[place] == found.object_id
+    mapped = estimate.object_ids[place] == object_id
     return estimate_all_images(
         recording,
         found.scene,

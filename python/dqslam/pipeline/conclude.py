@@ -18,6 +18,7 @@ from dqslam.io import Trajectory
 from dqslam.pipeline.hold_out import describe_overlap, overlap_with_map
 from dqslam.pipeline.lens import detections_with_exact_boxes
 from dqslam.pipeline.options import RunOptions
+from dqslam.pipeline.plausibility import find_doubtful
 from dqslam.pipeline.report import (
     box_chi2,
     describe_box_noise,
@@ -28,8 +29,8 @@ from dqslam.pipeline.report import (
     describe_times,
     warn_of_boxes,
     warn_of_calibration,
+    warn_of_doubtful,
     warn_of_evidence,
-    warn_of_sizes,
 )
 from dqslam.recording import Detections
 from dqslam.uncertainty import Marginals
@@ -67,6 +68,8 @@ class EstimatorOutput:
     """What was noticed on the way, a sentence each."""
     calibration: tuple[CalibrationFinding, ...] = ()
     """What the boxes say about camera, mount and odometry."""
+    hidden: Bools | None = None
+    """Edges of each box that a nearer object may hide, shape (m, 4); None where not looked for."""
     live_poses: Floats | None = None
     """Of a session, before its last polish: world_from_robot, shape (n, d)."""
     step_ms: Floats | None = None
@@ -79,7 +82,8 @@ class RunResult:
 
     estimate: Estimate
     detections: Detections
-    """All boxes, with the ids of the objects that they show; -1 for none."""
+    """All boxes, with the ids of the objects that they show, -1 for none. Edges that a nearer
+    object may hide count as truncated, too."""
     held_out: Bools
     """Which boxes were kept from the estimator, shape (m,)."""
     marginals: Marginals | None
@@ -105,14 +109,19 @@ def conclude(
     estimate, noise = output.estimate, output.odometry_noise
     object_id = boxes.object_id.copy()
     object_id[~held_out] = output.object_id
+    truncated = boxes.truncated.copy()
+    if output.hidden is not None:
+        truncated[~held_out] |= output.hidden
     detections = detections_with_exact_boxes(
         estimate.camera,
         estimate.pose_model,
         estimate.poses,
         estimate.object_ids,
         estimate.ellipsoids,
-        replace(boxes, object_id=object_id),
+        replace(boxes, object_id=object_id, truncated=truncated),
     )
+    doubtful = find_doubtful(estimate, output.size_prior, output.marginals)
+    estimate = replace(estimate, doubtful=doubtful)
     assigned = detections.select((object_id >= 0) & ~held_out)
     chi2 = box_chi2(estimate, assigned, output.object_noise or output.box_noise)
     mapped = np.isin(assigned.object_id, estimate.object_ids)
@@ -129,7 +138,7 @@ def conclude(
             *output.remarks,
             *doubts,
             *warn_of_evidence(output.evidence),
-            *warn_of_sizes(estimate, output.size_prior),
+            *warn_of_doubtful(estimate),
             *warn_of_calibration(output.calibration),
         ],
         "doubts": doubts,

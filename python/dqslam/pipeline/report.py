@@ -19,9 +19,6 @@ from dqslam.uncertainty import Marginals
 
 # A map that fewer boxes show is worth a warning.
 ENOUGH_EXPLAINED = 0.5
-# An axis is odd that is so many standard deviations of the logarithm from the usual one: with 0.7,
-# the spread of a recording, eight times as long or as short.
-MOST_SIZE_SIGMAS = 3.0
 # Score tests take the errors of boxes for independent. Those of real detectors are not.
 SURE_OF_CALIBRATION = 10.0  # sigmas
 
@@ -78,20 +75,10 @@ def warn_of_boxes(count: int, explained: int) -> list[str]:
     ]
 
 
-def warn_of_sizes(estimate: Estimate, prior: SizePrior | SizePriors) -> list[str]:
-    """Warn of objects with an axis that is far from the sizes that are expected of their class."""
-    warnings = []
-    for row, name in enumerate(estimate.class_names):
-        expected, axes = prior.of(name), estimate.semi_axes[row]
-        off = np.abs(np.log(axes) - expected.log_mean) / expected.log_sigma
-        if off.max() > MOST_SIZE_SIGMAS:
-            size = " x ".join(f"{2.0 * axis:.2g}" for axis in axes)
-            warnings.append(
-                f"object {estimate.object_ids[row]} ({name}) is {size} m, where "
-                f"{2.0 * np.exp(expected.log_mean):.2g} m is usual: its boxes leave its shape "
-                "open, or show more than one thing"
-            )
-    return warnings
+def warn_of_doubtful(estimate: Estimate) -> list[str]:
+    """Name the objects in the map whose size or shape is not to be believed."""
+    name_of = dict(zip(estimate.object_ids.tolist(), estimate.class_names, strict=True))
+    return [f"object {one} ({name_of[one]}): {why}" for one, why in estimate.doubtful.items()]
 
 
 def warn_of_calibration(findings: tuple[CalibrationFinding, ...]) -> list[str]:
@@ -149,6 +136,7 @@ def describe_objects(
             "center_m": estimate.centers[row].tolist(),
             "semi_axes_m": _numbers(estimate.semi_axes[row]),
             "center_sigma_m": _number(np.sqrt(np.trace(centers[row]))),
+            "doubt": estimate.doubtful.get(int(object_id)),
             **describe_boxes(chi2[detections.object_id == object_id]),
         }
         for row, object_id in enumerate(estimate.object_ids)

@@ -44,7 +44,8 @@ class Detections:
     class_names: dict[int, str] = field(default_factory=dict)
     """Name of every class id that occurs."""
     truncated: Bools = field(default_factory=lambda: np.zeros((0, 4), dtype=np.bool_))
-    """Whether each edge is cut by the image border, shape (m, 4); by default none is."""
+    """Whether the object may go on beyond each edge, which the border of the image or something
+    nearer cuts, shape (m, 4); by default none is."""
 
     def __post_init__(self) -> None:
         """Check shapes and numbers."""

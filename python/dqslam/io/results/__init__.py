@@ -5,8 +5,9 @@
 ``odometry.txt``    TUM: the initial poses, at the same times.
 ``camera.json``     ``fx fy cx cy width height k1 k2 p1 p2 k3``, as ``io.read_camera`` reads it.
 ``map.json``        ``objects``: ``id class_name center semi_axes orientation_xyzw dual_quadric
-                    observations``, and with marginals ``center_covariance`` [m^2] and
-                    ``log_semi_axes_sigma``; ``dropped``: ``id reason``.
+                    observations``, ``doubt`` where its size is not to be believed, and with
+                    marginals ``center_covariance`` [m^2] and ``log_semi_axes_sigma``;
+                    ``dropped``: ``id reason``.
 ``covariance.csv``  Covariances of poses, see ``covariances``. Only when marginals are given.
 ``boxes.csv``       A row per box, used or left out, see ``boxes``. Only when boxes are given.
 ==================  ================================================================================

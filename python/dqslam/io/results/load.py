@@ -59,6 +59,8 @@ class MapObjects:
     """Sigmas of the natural logarithms of the semi-axes, shape (o, 3); NaN if unknown."""
     dropped: Mapping[int, str] = field(default_factory=dict)
     """Reasons why objects are not in the map, by their ids."""
+    doubtful: Mapping[int, str] = field(default_factory=dict)
+    """Reasons why the size or shape of an object is not to be believed, by their ids."""
 
     def __len__(self) -> int:
         """Return the number of objects."""
@@ -230,6 +232,7 @@ def _read_map(path: Path) -> MapObjects:
             center_covariances=_maybe(objects, "center_covariance", (3, 3)),
             log_semi_axes_sigmas=_maybe(objects, "log_semi_axes_sigma", (3,)),
             dropped={int(one["id"]): str(one["reason"]) for one in content.get("dropped", [])},
+            doubtful={int(one["id"]): str(one["doubt"]) for one in objects if one.get("doubt")},
         )
     except (ValueError, TypeError, KeyError) as error:
         raise FileError(path, str(error)) from None
