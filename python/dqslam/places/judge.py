@@ -1,0 +1,241 @@
+"""Which of the motions is the place, and whether the maps say so: evidence against chance.
+
+The evidence of a motion is the logarithm of its probability over that of no common place, if either
+is as likely before, and any motion as likely as any other. By chance it exceeds s once in e^s maps
+whose objects are strewn at random. Objects that stand in rows, or in groups that repeat, are not:
+there the wrong motions themselves show how much evidence comes without a reason.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from dqslam._checks import Floats, Ints
+from dqslam.places.likelihood import (
+    SPREADS,
+    Objects,
+    Target,
+    attribute_ratio,
+    evidence,
+    log_densities,
+)
+from dqslam.places.rigid import MotionModel, Motions
+
+_ROUNDS = 6
+_REACH = 3.5  # sigmas of the widest spread within which a partner is looked for
+_SCALES = np.log(100.0)  # of scales that are possible before: a tenth to ten
+# Runners-up from which the tail of wrong motions is learned; fewer than the least say too little.
+_TAIL, _LEAST_TAIL = 20, 5
+_CHANCE = np.log(1e3)
+_SAME_PAIRS = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Hypothesis:
+    """A motion with what speaks for it."""
+
+    motion: Motions
+    """One motion, in a batch of one."""
+    partner: Ints
+    """Row of B for each object of A, -1 for none, shape (o,)."""
+    probability: Floats
+    """That the partner is right, shape (o,)."""
+    variance: Floats
+    """Of one coordinate of the distance of each pair, square meters, shape (o,)."""
+    height_variance: float
+    """Of the difference of two heights, square meters; NaN if z is like the other axes."""
+    evidence: float
+    """Natural logarithm."""
+
+    @property
+    def pairs(self) -> Ints:
+        """Rows of A and B of the pairs that are more likely right than wrong, shape (p, 2)."""
+        rows = np.flatnonzero((self.partner >= 0) & (self.probability > 0.5))
+        return np.column_stack([rows, self.partner[rows]])
+
+
+def judge(a: Objects, target: Target, model: MotionModel, motions: Motions) -> list[Hypothesis]:
+    """Fit each motion to the whole maps; return distinct ones, the one with most evidence first."""
+    found = [_fit(a, target, model, motions[[row]]) for row in range(len(motions))]
+    found.sort(key=lambda one: -one.evidence)
+    distinct: list[Hypothesis] = []
+    for one in found:
+        if len(one.pairs) and not any(_same(one, other) for other in distinct):
+            distinct.append(one)
+    return distinct
+
+
+def tail_of(evidences: list[float]) -> float:
+    """Return by how much the evidence of wrong motions grows where one in e of them is left.
+
+    It is the mean excess of the runners-up over the last of them; 1 is that of chance alone.
+    """
+    tail = np.array(evidences[1 : _TAIL + 1])
+    if len(tail) < _LEAST_TAIL:
+        return 1.0
+    return max(1.0, float((tail[:-1] - tail[-1]).mean()))
+
+
+def _same(one: Hypothesis, other: Hypothesis) -> bool:
+    pairs = one.pairs
+    shared = int((other.partner[pairs[:, 0]] == pairs[:, 1]).sum())
+    return shared > _SAME_PAIRS * len(pairs)
+
+
+def doubt(found: list[Hypothesis]) -> tuple[str, float, float]:
+    """Return why the best motion may be chance or another be right; and the needed numbers.
+
+    They are the evidence that is needed, and the evidence above the runner-up's that is needed.
+    """
+    evidences = [one.evidence for one in found]
+    needed = _CHANCE * tail_of(evidences)
+    best = found[0]
+    if len(best.pairs) < 3:
+        why = f"at most {len(best.pairs)} objects agree about a motion, three are needed"
+    elif best.evidence < _CHANCE:
+        why = (
+            f"the {len(best.pairs)} objects that agree best may do so by chance (evidence "
+            f"{best.evidence:.1f}, {_CHANCE:.1f} is needed)"
+        )
+    elif len(found) > 1 and best.evidence - found[1].evidence < needed:
+        why = (
+            f"another motion explains the maps nearly as well ({len(found[1].pairs)} pairs, "
+            f"evidence {found[1].evidence:.1f}, beside {len(best.pairs)} pairs and "
+            f"{best.evidence:.1f}; {needed:.1f} more is needed)"
+        )
+    else:
+        why = ""
+    return why, _CHANCE, needed
+
+
+def _fit(a: Objects, target: Target, model: MotionModel, motion: Motions) -> Hypothesis:
+    """Match and fit in turn, and judge the result."""
+    for _ in range(_ROUNDS):
+        matched = _match(a, target, model, motion)
+        weight = matched["probability"] / matched["variance"]
+        if (matched["probability"] > 0.5).sum() < 2:
+            break
+        rows = np.maximum(matched["partner"], 0)
+        before = motion
+        motion = model.fit(a.centers[None], target.objects.centers[rows][None], weight[None])
+        if np.allclose(before.rotation, motion.rotation, atol=1e-9) and np.allclose(
+            before.translation, motion.translation, atol=1e-7
+        ):
+            break
+    matched = _match(a, target, model, motion)
+    prior = _prior(a, target, model, motion, matched)
+    return Hypothesis(
+        motion=motion,
+        partner=matched["partner"],
+        probability=matched["probability"],
+        variance=matched["variance"],
+        height_variance=matched["height_variance"],
+        evidence=matched["log_ratio"] + prior,
+    )
+
+
+def _match(a: Objects, target: Target, model: MotionModel, motion: Motions) -> dict[str, Any]:
+    b = target.objects
+    moved = motion.apply(a.centers[None])[0]
+    widest = np.sqrt(SPREADS[-1] * 2.0 * max(a.variance.max(), b.variance.max()))
+    distance, row = target.nearest(moved, a.labels, _REACH * float(widest))
+    row = np.where(_one_to_one(distance, row), row, -1)
+    met = np.flatnonzero(row >= 0)
+    partner = row[met]
+    variance = a.variance[met] * motion.scale[0] ** 2 + b.variance[partner]
+    log_ratio = np.full((len(SPREADS), len(a)), -np.inf)
+    log_ratio[:, met] = log_densities(
+        distance[met] ** 2, SPREADS[:, None] * variance, target.axes
+    ) - np.log(target.background[partner])
+    attributes = np.zeros(len(met))
+    size_spread = _spread(a.size, b.size)
+    size_variance = a.size_variance[met] + b.size_variance[partner]
+    shift = np.log(motion.scale[0])
+    attributes += attribute_ratio(
+        a.size[met] + shift - b.size[partner], size_variance, size_spread
+    )
+    height_variance = float("nan")
+    if model.upright and len(met):
+        near = distance[met] ** 2 < 9.0 * variance
+        difference = moved[met, 2] - b.centers[partner, 2]
+        chosen = difference[near] if near.sum() >= 3 else difference
+        middle = float(np.median(chosen))
+        spread = 1.4826 * float(np.median(np.abs(chosen - middle)))
+        height_variance = max(spread**2, float(SPREADS[0] * variance.mean()))
+        attributes += _heights(a, b, met, difference - middle, height_variance)
+    log_ratio[:, met] += attributes
+    total, probability, _, spread_row = evidence(log_ratio, target.covers(moved))
+    full = np.full(len(a), np.inf)
+    full[met] = SPREADS[spread_row] * variance
+    return {
+        "partner": row,
+        "probability": np.where(row >= 0, probability, 0.0),
+        "variance": full,
+        "height_variance": height_variance,
+        "log_ratio": total,
+    }
+
+
+def _heights(a: Objects, b: Objects, met: Ints, difference: Floats, variance: float) -> Floats:
+    """Return the log ratios of heights, against those of two objects of the class."""
+    ratio = np.zeros(len(met))
+    for label in np.unique(a.labels[met]):
+        of_class = a.labels[met] == label
+        spread = _spread(a.centers[a.labels == label, 2], b.centers[b.labels == label, 2])
+        ratio[of_class] = attribute_ratio(difference[of_class], np.array(variance), spread)
+    return ratio
+
+
+def _spread(a: Floats, b: Floats) -> float:
+    """Return the variance of the difference of a value of A and one of B; 0 if unknown."""
+    known = [values[np.isfinite(values)] for values in (a, b)]
+    return float(sum(values.var() for values in known if len(values) > 1))
+
+
+def _one_to_one(distance: Floats, row: Ints) -> Any:
+    """Return whether each object of A is the nearest of those with the same partner, (o,)."""
+    order = np.lexsort((distance, row))
+    first = np.ones(len(row), dtype=np.bool_)
+    first[order[1:]] = row[order[1:]] != row[order[:-1]]
+    return first & np.isfinite(distance)
+
+
+def _prior(
+    a: Objects, target: Target, model: MotionModel, motion: Motions, matched: dict[str, Any]
+) -> float:
+    """Return the log share of all motions that fit as well: what a precise fit has to pay."""
+    rows = np.flatnonzero(matched["partner"] >= 0)
+    weight = matched["probability"][rows] / matched["variance"][rows]
+    places = motion.apply(a.centers[None, rows])[0]
+    jacobian = tangent(places - np.average(places, axis=0, weights=weight + 1e-300), model)
+    information = np.einsum("o,oij,oik->jk", weight, jacobian[:, : target.axes], jacobian[:, : target.axes])
+    columns = [0, 1, 3] if model.upright else [0, 1, 2, 3, 4, 5]
+    columns += [jacobian.shape[2] - 1] if model.has_scale else []
+    information = information[np.ix_(columns, columns)]
+    extents = [np.ptp(x.centers[:, : target.axes], axis=0) for x in (a, target.objects)]
+    room = np.log(np.maximum(extents[0] * motion.scale[0] + extents[1], 1e-6)).sum()
+    turns = np.log(2.0 * np.pi) if model.upright else np.log(8.0 * np.pi**2)
+    volume = room + turns + (_SCALES if model.has_scale else 0.0)
+    floor = np.exp(-volume * 2.0 / len(columns)) * np.eye(len(columns))
+    _, logdet = np.linalg.slogdet(information / (2.0 * np.pi) + floor)
+    return float(min(-0.5 * logdet - volume, 0.0))
+
+
+def tangent(places: Floats, model: MotionModel) -> Floats:
+    """Return the derivatives of places by a motion: x y z, then turns, then log scale.
+
+    Turns are about z alone if upright, else about x y z. Shape (o, 3, 4 or 6, plus 1 with scale).
+    """
+    count = len(places)
+    x, y, z = places.T
+    turns = np.zeros((count, 3, 3))
+    turns[:, 1, 0], turns[:, 2, 0] = -z, y
+    turns[:, 0, 1], turns[:, 2, 1] = z, -x
+    turns[:, 0, 2], turns[:, 1, 2] = -y, x
+    parts = [np.tile(np.eye(3), (count, 1, 1)), turns[:, :, 2:] if model.upright else turns]
+    if model.has_scale:
+        parts.append(places[:, :, None])
+    return np.concatenate(parts, axis=2)
