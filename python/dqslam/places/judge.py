@@ -21,15 +21,20 @@ from dqslam.places.likelihood import (
     attribute_ratio,
     evidence,
     log_densities,
+    log_student,
+    tangent,
 )
 from dqslam.places.rigid import MotionModel, Motions
 
 _ROUNDS = 6
 _REACH = 3.5  # sigmas of the widest spread within which a partner is looked for
 _SCALES = np.log(100.0)  # of scales that are possible before: a tenth to ten
-# Runners-up from which the tail of wrong motions is learned; fewer than the least say too little.
-_TAIL, _LEAST_TAIL = 20, 5
-_CHANCE = np.log(1e3)
+# Runners-up from which the tail of wrong motions is learned, at most the better half of them; fewer
+# than the least say too little.
+_TAIL, _LEAST_TAIL = 10, 4
+# One in a hundred: for the evidence this is a bound, which chance stays far below.
+_CHANCE = np.log(1e2)
+_RIVAL = np.log(1e3)
 _SAME_PAIRS = 0.5
 
 
@@ -73,10 +78,25 @@ def tail_of(evidences: list[float]) -> float:
 
     It is the mean excess of the runners-up over the last of them; 1 is that of chance alone.
     """
-    tail = np.array(evidences[1 : _TAIL + 1])
+    tail = np.array(evidences[1 : 1 + min(_TAIL, (len(evidences) - 1) // 2)])
     if len(tail) < _LEAST_TAIL:
         return 1.0
     return max(1.0, float((tail[:-1] - tail[-1]).mean()))
+
+
+def match_again(a: Objects, target: Target, motion: Motions, variance: Floats) -> Ints:
+    """Return the pairs (p, 2) that errors of variance (o,) explain better than chance does.
+
+    Errors have Student's distribution, and as many objects are in both maps as in one.
+    """
+    moved = motion.apply(a.centers[None])[0]
+    reach = float(np.sqrt(variance.max())) * 2.0 * _REACH
+    distance, row = target.nearest(moved, a.labels, reach)
+    rows = np.flatnonzero(_one_to_one(distance, row))
+    partner, square = row[rows], distance[rows] ** 2
+    likely = log_student(square, variance[rows], target.axes)
+    met = likely > np.log(target.background[partner])
+    return np.column_stack([rows[met], partner[met]])
 
 
 def _same(one: Hypothesis, other: Hypothesis) -> bool:
@@ -91,7 +111,7 @@ def doubt(found: list[Hypothesis]) -> tuple[str, float, float]:
     They are the evidence that is needed, and the evidence above the runner-up's that is needed.
     """
     evidences = [one.evidence for one in found]
-    needed = _CHANCE * tail_of(evidences)
+    needed = _RIVAL * tail_of(evidences)
     best = found[0]
     if len(best.pairs) < 3:
         why = f"at most {len(best.pairs)} objects agree about a motion, three are needed"
@@ -222,20 +242,3 @@ def _prior(
     floor = np.exp(-volume * 2.0 / len(columns)) * np.eye(len(columns))
     _, logdet = np.linalg.slogdet(information / (2.0 * np.pi) + floor)
     return float(min(-0.5 * logdet - volume, 0.0))
-
-
-def tangent(places: Floats, model: MotionModel) -> Floats:
-    """Return the derivatives of places by a motion: x y z, then turns, then log scale.
-
-    Turns are about z alone if upright, else about x y z. Shape (o, 3, 4 or 6, plus 1 with scale).
-    """
-    count = len(places)
-    x, y, z = places.T
-    turns = np.zeros((count, 3, 3))
-    turns[:, 1, 0], turns[:, 2, 0] = -z, y
-    turns[:, 0, 1], turns[:, 2, 1] = z, -x
-    turns[:, 0, 2], turns[:, 1, 2] = -y, x
-    parts = [np.tile(np.eye(3), (count, 1, 1)), turns[:, :, 2:] if model.upright else turns]
-    if model.has_scale:
-        parts.append(places[:, :, None])
-    return np.concatenate(parts, axis=2)

@@ -24,6 +24,8 @@ SPREADS = 4.0 ** np.arange(-3.0, 2.0)
 _NEIGHBORS = 6  # of the local density: fewer are noisy, more are not local
 # An object farther from all objects of B than this many spacings is outside of B.
 _OUTSIDE = 3.0
+FREEDOM = 1.0
+"""Degrees of freedom of Student's t, Cauchy's here: errors of objects in maps have long tails."""
 _LEAST_RATIO = -3.0  # logarithm for one height or size: some are simply wrong
 
 
@@ -118,6 +120,16 @@ def log_densities(square: Floats, variance: Floats, axes: int) -> Floats:
     return np.asarray(-0.5 * square / variance - 0.5 * axes * np.log(2.0 * np.pi * variance))
 
 
+def log_student(square: Floats, variance: Floats, axes: int) -> Floats:
+    """Return the logarithm of Student's density of squared distances."""
+    from scipy.special import gammaln
+
+    half = 0.5 * (FREEDOM + axes)
+    constant = gammaln(half) - gammaln(0.5 * FREEDOM) - 0.5 * axes * np.log(FREEDOM * np.pi)
+    spread = -0.5 * axes * np.log(variance)
+    return np.asarray(constant + spread - half * np.log1p(square / (FREEDOM * variance)))
+
+
 def attribute_ratio(difference: Floats, variance: Floats, spread: float) -> Floats:
     """Return log ratios of one attribute, such as height: of one object, against of any two.
 
@@ -146,3 +158,20 @@ def evidence(
     share, spread = int(best[0]), int(best[1])
     weight = SHARES[share] * ratio[spread]
     return mean, weight / (1.0 - SHARES[share] + weight), share, spread
+
+
+def tangent(places: Floats, model: MotionModel) -> Floats:
+    """Return the derivatives of places by a motion: x y z, then turns, then log scale.
+
+    Turns are about z alone if upright, else about x y z. Shape (o, 3, 4 or 6, plus 1 with scale).
+    """
+    count = len(places)
+    x, y, z = places.T
+    turns = np.zeros((count, 3, 3))
+    turns[:, 1, 0], turns[:, 2, 0] = -z, y
+    turns[:, 0, 1], turns[:, 2, 1] = z, -x
+    turns[:, 0, 2], turns[:, 1, 2] = -y, x
+    parts = [np.tile(np.eye(3), (count, 1, 1)), turns[:, :, 2:] if model.upright else turns]
+    if model.has_scale:
+        parts.append(places[:, :, None])
+    return np.concatenate(parts, axis=2)
