@@ -9,7 +9,7 @@ import numpy as np
 
 from dqslam._checks import Floats, Ints
 from dqslam._repr import counted
-from dqslam.places.judge import Hypothesis, doubt, judge, match_again
+from dqslam.places.judge import CHANCE, RIVAL, Hypothesis, doubt, judge, lead, match_again
 from dqslam.places.landmarks import Landmarks, Source, read_landmarks
 from dqslam.places.likelihood import Objects, Target, spacing
 from dqslam.places.refine import Refined, refine
@@ -77,10 +77,9 @@ class Alignment:
     """Between both objects of a pair, once aligned, meters, shape (p,)."""
     evidence: float
     """Natural logarithm of the odds of this motion against no common place."""
-    evidence_needed: float
-    """What the evidence must be above to exclude chance."""
-    lead_needed: float
-    """What the evidence must be above that of the runner-up."""
+    lead: float
+    """By how much it leads the runner-up, in units of what wrong motions lead by; a wrong one
+    leads by s once in e^s maps. Infinite without a runner-up."""
     runner_up: Rival | None
     """The next best motion; None if no other takes an object of A to one of B."""
     assumptions: tuple[str, ...] = field(default_factory=tuple)
@@ -198,10 +197,9 @@ def _align(
     found = judge(objects_a, target, model, candidates.motions)
     if not found:
         raise _TooFewError("no three objects of one map lie to each other as in the other map")
-    why, needed, lead = doubt(found)
+    why = doubt(found)
     if why:
-        rival = found[1] if len(found) > 1 else None
-        raise _refusal(why, found[0], rival, needed)
+        raise _refusal(why, found)
     pairs, motion = found[0].pairs, found[0].motion
     for _ in range(_GROWTHS):
         of_maps = np.column_stack([r[pairs[:, i]] for i, r in enumerate(rows)])
@@ -211,7 +209,7 @@ def _align(
         pairs = match_again(objects_a, target, motion, variance)
         if len(pairs) < _FEWEST or np.array_equal(pairs, before):
             break
-    return _alignment(a, b, found, of_maps, refined, model, needed, lead, assumed)
+    return _alignment(a, b, found, of_maps, refined, model, assumed)
 
 
 def _variance_by_class(
@@ -227,12 +225,11 @@ def _variance_by_class(
     return variance
 
 
-def _refusal(
-    why: str, best: Hypothesis, rival: Hypothesis | None, needed: float
-) -> CannotTellError:
-    if rival is None or best.evidence < needed:
+def _refusal(why: str, found: list[Hypothesis]) -> CannotTellError:
+    if len(found) < 2 or found[0].evidence < CHANCE:
         return _TooFewError(why)
-    return CannotTellError(f"{why}: {describe(best.motion)}, or {describe(rival.motion)}")
+    first, second = (describe(one.motion) for one in found[:2])
+    return CannotTellError(f"{why}: {first}, or {second}")
 
 
 def describe(motion: Motions) -> str:
@@ -275,8 +272,6 @@ def _alignment(
     pairs: Ints,
     refined: Refined,
     model: MotionModel,
-    needed: float,
-    lead: float,
     sigma: float,
 ) -> Alignment:
     best = found[0]
@@ -293,8 +288,7 @@ def _alignment(
         class_names=tuple(a.class_names[row] for row in rows_a.tolist()),
         distance=np.linalg.norm(refined.differences, axis=1),
         evidence=best.evidence,
-        evidence_needed=needed,
-        lead_needed=lead,
+        lead=lead(found),
         runner_up=None
         if rival is None
         else Rival(_matrix(rival.motion), len(rival.pairs), rival.evidence),
@@ -336,8 +330,9 @@ def describe_alignment(found: Alignment, a: str, b: str) -> dict[str, Any]:
         "log_scale_sigma": found.scale_sigma,
         "rms_m": found.rms_m,
         "evidence": found.evidence,
-        "evidence_needed": found.evidence_needed,
-        "lead_needed": found.lead_needed,
+        "evidence_needed": CHANCE,
+        "lead": found.lead,
+        "lead_needed": RIVAL,
         "runner_up": None if rival is None else vars(rival),
         "pairs": [
             {"a": one, "b": other, "class_name": name, "distance_m": apart}

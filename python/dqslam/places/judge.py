@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from dqslam._checks import Floats, Ints
+from dqslam._checks import Bools, Floats, Ints
+from dqslam._repr import counted
 from dqslam.places.likelihood import (
     SPREADS,
     Objects,
@@ -32,9 +33,11 @@ _SCALES = np.log(100.0)  # of scales that are possible before: a tenth to ten
 # Runners-up from which the tail of wrong motions is learned, at most the better half of them; fewer
 # than the least say too little.
 _TAIL, _LEAST_TAIL = 10, 4
-# One in a hundred: for the evidence this is a bound, which chance stays far below.
-_CHANCE = np.log(1e2)
-_RIVAL = np.log(1e3)
+_FEWEST_PAIRS = 3
+CHANCE = float(np.log(1e2))
+"""The evidence that is needed: one map in a hundred has it by chance, and this is a bound."""
+RIVAL = float(np.log(1e3))
+"""The lead that is needed, see ``lead``."""
 _SAME_PAIRS = 0.5
 
 
@@ -54,6 +57,8 @@ class Hypothesis:
     """Of the difference of two heights, square meters; NaN if z is like the other axes."""
     evidence: float
     """Natural logarithm."""
+    by_class: Floats
+    """The part of the evidence that is of the objects of each class, shape (c,)."""
 
     @property
     def pairs(self) -> Ints:
@@ -73,15 +78,30 @@ def judge(a: Objects, target: Target, model: MotionModel, motions: Motions) -> l
     return distinct
 
 
-def tail_of(evidences: list[float]) -> float:
-    """Return by how much the evidence of wrong motions grows where one in e of them is left.
+def tail_of(evidences: Floats) -> Floats:
+    """Return by how much evidence grows where one in e of the wrong motions is left.
 
-    It is the mean excess of the runners-up over the last of them; 1 is that of chance alone.
+    ``evidences`` (m, c) are of the runners-up, by class. The tail is the mean excess of the better
+    ones over the last of them; 1 is that of chance alone. Classes whose objects stand in rows or
+    groups have a longer one. Shape (c,).
     """
-    tail = np.array(evidences[1 : 1 + min(_TAIL, (len(evidences) - 1) // 2)])
-    if len(tail) < _LEAST_TAIL:
-        return 1.0
-    return max(1.0, float((tail[:-1] - tail[-1]).mean()))
+    count = min(_TAIL, len(evidences) // 2)
+    if count < _LEAST_TAIL:
+        return np.ones(evidences.shape[1])
+    tail = -np.sort(-evidences, axis=0)[:count]
+    return np.maximum(1.0, (tail[:-1] - tail[-1]).mean(axis=0))
+
+
+def lead(found: list[Hypothesis]) -> float:
+    """Return by how much the best motion leads, in units of what wrong motions lead by.
+
+    A wrong motion leads by s once in e^s maps. Infinite without a runner-up.
+    """
+    if len(found) < 2:
+        return float("inf")
+    others = np.array([one.by_class for one in found[1:]])
+    ahead = (found[0].by_class - others[0]) / tail_of(others)
+    return float(ahead.sum())
 
 
 def match_again(a: Objects, target: Target, motion: Motions, variance: Floats) -> Ints:
@@ -105,36 +125,33 @@ def _same(one: Hypothesis, other: Hypothesis) -> bool:
     return shared > _SAME_PAIRS * len(pairs)
 
 
-def doubt(found: list[Hypothesis]) -> tuple[str, float, float]:
-    """Return why the best motion may be chance or another be right; and the needed numbers.
-
-    They are the evidence that is needed, and the evidence above the runner-up's that is needed.
-    """
-    evidences = [one.evidence for one in found]
-    needed = _RIVAL * tail_of(evidences)
-    best = found[0]
-    if len(best.pairs) < 3:
-        why = f"at most {len(best.pairs)} objects agree about a motion, three are needed"
-    elif best.evidence < _CHANCE:
-        why = (
+def doubt(found: list[Hypothesis]) -> str:
+    """Return why the best motion may be chance, or another be right; nothing if neither is so."""
+    best, ahead = found[0], lead(found)
+    if len(best.pairs) < _FEWEST_PAIRS:
+        return (
+            f"at most {counted(len(best.pairs), 'object')} agree about a motion, "
+            f"{_FEWEST_PAIRS} are needed"
+        )
+    if best.evidence < CHANCE:
+        return (
             f"the {len(best.pairs)} objects that agree best may do so by chance (evidence "
-            f"{best.evidence:.1f}, {_CHANCE:.1f} is needed)"
+            f"{best.evidence:.1f}, {CHANCE:.1f} is needed)"
         )
-    elif len(found) > 1 and best.evidence - found[1].evidence < needed:
-        why = (
-            f"another motion explains the maps nearly as well ({len(found[1].pairs)} pairs, "
-            f"evidence {found[1].evidence:.1f}, beside {len(best.pairs)} pairs and "
-            f"{best.evidence:.1f}; {needed:.1f} more is needed)"
+    if ahead < RIVAL:
+        return (
+            f"another motion explains the maps nearly as well: {len(found[1].pairs)} objects agree "
+            f"about it, {len(best.pairs)} about the best one, whose lead is {ahead:.1f}, where "
+            f"{RIVAL:.1f} is needed"
         )
-    else:
-        why = ""
-    return why, _CHANCE, needed
+    return ""
 
 
 def _fit(a: Objects, target: Target, model: MotionModel, motion: Motions) -> Hypothesis:
     """Match and fit in turn, and judge the result."""
+    covered = target.covers(motion.apply(a.centers[None])[0])
     for _ in range(_ROUNDS):
-        matched = _match(a, target, model, motion)
+        matched = _match(a, target, model, motion, covered)
         weight = matched["probability"] / matched["variance"]
         if (matched["probability"] > 0.5).sum() < 2:
             break
@@ -145,7 +162,7 @@ def _fit(a: Objects, target: Target, model: MotionModel, motion: Motions) -> Hyp
             before.translation, motion.translation, atol=1e-7
         ):
             break
-    matched = _match(a, target, model, motion)
+    matched = _match(a, target, model, motion, covered)
     prior = _prior(a, target, model, motion, matched)
     return Hypothesis(
         motion=motion,
@@ -154,10 +171,13 @@ def _fit(a: Objects, target: Target, model: MotionModel, motion: Motions) -> Hyp
         variance=matched["variance"],
         height_variance=matched["height_variance"],
         evidence=matched["log_ratio"] + prior,
+        by_class=matched["by_class"],
     )
 
 
-def _match(a: Objects, target: Target, model: MotionModel, motion: Motions) -> dict[str, Any]:
+def _match(
+    a: Objects, target: Target, model: MotionModel, motion: Motions, covered: Bools
+) -> dict[str, Any]:
     b = target.objects
     moved = motion.apply(a.centers[None])[0]
     widest = np.sqrt(SPREADS[-1] * 2.0 * max(a.variance.max(), b.variance.max()))
@@ -187,7 +207,7 @@ def _match(a: Objects, target: Target, model: MotionModel, motion: Motions) -> d
         height_variance = max(spread**2, float(SPREADS[0] * variance.mean()))
         attributes += _heights(a, b, met, difference - middle, height_variance)
     log_ratio[:, met] += attributes
-    total, probability, _, spread_row = evidence(log_ratio, target.covers(moved))
+    total, probability, terms, spread_row = evidence(log_ratio, covered)
     full = np.full(len(a), np.inf)
     full[met] = SPREADS[spread_row] * variance
     return {
@@ -196,6 +216,7 @@ def _match(a: Objects, target: Target, model: MotionModel, motion: Motions) -> d
         "variance": full,
         "height_variance": height_variance,
         "log_ratio": total,
+        "by_class": np.bincount(a.labels, terms, int(a.labels.max()) + 1),
     }
 
 

@@ -26,6 +26,7 @@ _NEIGHBORS = 6  # of the local density: fewer are noisy, more are not local
 _OUTSIDE = 3.0
 FREEDOM = 1.0
 """Degrees of freedom of Student's t, Cauchy's here: errors of objects in maps have long tails."""
+_LARGEST_LOG = 500.0  # of a ratio, before it would overflow
 _LEAST_RATIO = -3.0  # logarithm for one height or size: some are simply wrong
 
 
@@ -141,23 +142,23 @@ def attribute_ratio(difference: Floats, variance: Floats, spread: float) -> Floa
     return np.nan_to_num(np.maximum(ratio, _LEAST_RATIO), nan=0.0)
 
 
-def evidence(
-    log_ratio: Floats, covered: Bools
-) -> tuple[float, Floats, int, int]:
+def evidence(log_ratio: Floats, covered: Bools) -> tuple[float, Floats, Floats, int]:
     """Sum the ratios of all objects over the grid; log_ratio has shape (spreads, o).
 
-    Objects of A without a partner have -inf. Returns the logarithm of the mean likelihood ratio, the
-    probability of each pair to be right at the best entry of the grid, and that entry.
+    Objects of A without a partner have -inf. Returns the logarithm of the mean likelihood ratio and,
+    at the best entry of the grid, the probability of each pair to be right, the part of each object,
+    and the row of the spread.
     """
-    ratio = np.exp(np.minimum(log_ratio, 500.0))
+    ratio = np.exp(np.minimum(log_ratio, _LARGEST_LOG))
     terms = np.log1p(SHARES[:, None, None] * (ratio[None] - 1.0))
-    total = np.where(covered, terms, 0.0).sum(axis=2)
-    best = np.unravel_index(int(np.argmax(total)), total.shape)
-    peak = total[best]
+    terms = np.where(covered, terms, 0.0)
+    total = terms.sum(axis=2)
+    share, spread = np.unravel_index(int(np.argmax(total)), total.shape)
+    peak = total[share, spread]
     mean = float(peak + np.log(np.exp(total - peak).mean()))
-    share, spread = int(best[0]), int(best[1])
     weight = SHARES[share] * ratio[spread]
-    return mean, weight / (1.0 - SHARES[share] + weight), share, spread
+    probability = weight / (1.0 - SHARES[share] + weight)
+    return mean, probability, terms[share, spread], int(spread)
 
 
 def tangent(places: Floats, model: MotionModel) -> Floats:

@@ -81,6 +81,8 @@ def _from_triangles(
         )
     of_a, of_b = triangles
     tolerance = _SIDE_SIGMAS * sigma
+    if model.has_scale:  # sides are logarithms of ratios
+        tolerance *= float(np.median([np.median(one.per_meter) for one in triangles if len(one)]))
     rows_a, rows_b = match_triangles(of_a, of_b, tolerance, _MATCHES)
     corners_a, corners_b = of_a.corners[rows_a], of_b.corners[rows_b]
     motions = model.fit(a.centers[corners_a], b.centers[corners_b], np.ones(corners_a.shape))

@@ -25,6 +25,8 @@ class Triangles:
     """Rows of the objects, the first is the anchor, shape (t, 3)."""
     sides: Floats
     """What a motion keeps: lengths in meters, or logarithms of their ratios; shape (t, 2 or 3)."""
+    per_meter: Floats
+    """How much the largest change of sides is by a meter of one of them, shape (t,)."""
     code: Ints
     """The same for the same classes in the same order, shape (t,)."""
 
@@ -72,9 +74,11 @@ def find_triangles(
     corners, sides = corners[long], sides[long]
     count = int(labels.max(initial=0)) + 1
     code = labels[corners] @ np.array([count * count, count, 1])
+    per_meter = np.ones(len(code))
     if model.has_scale:
+        per_meter = 1.0 / sides.min(axis=1)
         sides = np.log(sides[:, 1:] / sides[:, :1])
-    return Triangles(corners, sides, code)
+    return Triangles(corners, sides, per_meter, code)
 
 
 def match_triangles(a: Triangles, b: Triangles, tolerance: float, most: int) -> tuple[Ints, Ints]:
