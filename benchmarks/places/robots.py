@@ -1,4 +1,4 @@
-"""Two robots in one world: each sees a part of its objects, from its own start, with its own drift."""
+"""Two robots in one world, each with a part of the objects, a start and a drift of its own."""
 
 from __future__ import annotations
 
@@ -33,9 +33,7 @@ class Robot:
 def world(objects: int = OBJECTS, kind: str = "ellipsoids") -> Scenario:
     """Return three times the paper's world."""
     scenario = dq.load_scenario("paper")
-    path = scenario.path.model_copy(
-        update={"length_m": 20.0 * _SIDES, "width_m": 12.5 * _SIDES}
-    )
+    path = scenario.path.model_copy(update={"length_m": 20.0 * _SIDES, "width_m": 12.5 * _SIDES})
     room = scenario.world.model_copy(update={"object_count": objects})
     return scenario.model_copy(update={"path": path, "world": room, "objects": kind})
 

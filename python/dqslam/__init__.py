@@ -15,6 +15,7 @@ if TYPE_CHECKING:  # the one list of public names, a line each: lazy_exports rea
     from dqslam import metrics as metrics
     from dqslam import online as online
     from dqslam import pipeline as pipeline
+    from dqslam import places as places
     from dqslam import plot as plot
     from dqslam import simulation as simulation
     from dqslam import studies as studies
@@ -78,6 +79,11 @@ if TYPE_CHECKING:  # the one list of public names, a line each: lazy_exports rea
     from dqslam.pipeline import RunResult as RunResult
     from dqslam.pipeline import run as run
     from dqslam.pipeline import run_files as run_files
+    from dqslam.places import Alignment as Alignment
+    from dqslam.places import CannotTellError as CannotTellError
+    from dqslam.places import Landmarks as Landmarks
+    from dqslam.places import align as align
+    from dqslam.places import read_landmarks as read_landmarks
     from dqslam.plot import plot_maps as plot_maps
     from dqslam.recording import AbsolutePositions as AbsolutePositions
     from dqslam.recording import Detections as Detections

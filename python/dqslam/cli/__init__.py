@@ -17,6 +17,7 @@ from dqslam._manifest import ChangedFileWarning
 from dqslam._repr import printable
 from dqslam._version import version
 from dqslam.cli.ablation import ablation
+from dqslam.cli.align import align
 from dqslam.cli.convert import convert
 from dqslam.cli.degeneracy import degeneracy
 from dqslam.cli.demo import demo
@@ -34,6 +35,7 @@ from dqslam.cli.worlds import worlds
 COMMANDS: dict[str, tuple[Callable[..., None], ...]] = {
     "Start here": (demo, paper, simulate),
     "Your recording": (inspect, convert, run, evaluate),
+    "Places": (align,),
     "Look": (plot, view),
     "Study": (sweep, worlds, ablation, degeneracy),
 }
@@ -41,7 +43,8 @@ EXIT_CODES = {
     0: "done",
     1: "a mistake in dqslam itself; its traceback is shown",
     2: "bad input: options, files, or a problem that they do not determine",
-    3: "done, but the result of `run` is doubtful, or `inspect --strict` has found a mistake",
+    3: "done, but the result of `run` is doubtful, `inspect --strict` has found a mistake, or "
+    "maps do not say whether they are of one place",
     130: "stopped by Ctrl-C",
     141: "stopped, because the reader of its output has gone",
 }

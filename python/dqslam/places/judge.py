@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 
 from dqslam._checks import Bools, Floats, Ints
-from dqslam._repr import counted
 from dqslam.places.likelihood import (
     SPREADS,
     Objects,
@@ -89,7 +88,7 @@ def tail_of(evidences: Floats) -> Floats:
     if count < _LEAST_TAIL:
         return np.ones(evidences.shape[1])
     tail = -np.sort(-evidences, axis=0)[:count]
-    return np.maximum(1.0, (tail[:-1] - tail[-1]).mean(axis=0))
+    return np.asarray(np.maximum(1.0, (tail[:-1] - tail[-1]).mean(axis=0)))
 
 
 def lead(found: list[Hypothesis]) -> float:
@@ -129,10 +128,7 @@ def doubt(found: list[Hypothesis]) -> str:
     """Return why the best motion may be chance, or another be right; nothing if neither is so."""
     best, ahead = found[0], lead(found)
     if len(best.pairs) < _FEWEST_PAIRS:
-        return (
-            f"at most {counted(len(best.pairs), 'object')} agree about a motion, "
-            f"{_FEWEST_PAIRS} are needed"
-        )
+        return f"no {_FEWEST_PAIRS} objects of one map lie to each other as in the other map"
     if best.evidence < CHANCE:
         return (
             f"the {len(best.pairs)} objects that agree best may do so by chance (evidence "
@@ -194,9 +190,7 @@ def _match(
     size_spread = _spread(a.size, b.size)
     size_variance = a.size_variance[met] + b.size_variance[partner]
     shift = np.log(motion.scale[0])
-    attributes += attribute_ratio(
-        a.size[met] + shift - b.size[partner], size_variance, size_spread
-    )
+    attributes += attribute_ratio(a.size[met] + shift - b.size[partner], size_variance, size_spread)
     height_variance = float("nan")
     if model.upright and len(met):
         near = distance[met] ** 2 < 9.0 * variance
@@ -252,7 +246,9 @@ def _prior(
     weight = matched["probability"][rows] / matched["variance"][rows]
     places = motion.apply(a.centers[None, rows])[0]
     jacobian = tangent(places - np.average(places, axis=0, weights=weight + 1e-300), model)
-    information = np.einsum("o,oij,oik->jk", weight, jacobian[:, : target.axes], jacobian[:, : target.axes])
+    information = np.einsum(
+        "o,oij,oik->jk", weight, jacobian[:, : target.axes], jacobian[:, : target.axes]
+    )
     columns = [0, 1, 3] if model.upright else [0, 1, 2, 3, 4, 5]
     columns += [jacobian.shape[2] - 1] if model.has_scale else []
     information = information[np.ix_(columns, columns)]

@@ -148,7 +148,7 @@ def _of_csv(path: Path) -> Landmarks:
         message = f"no column {CLASSES[0]} (it has: {', '.join(table.columns)})"
         raise FileError(path, message, table.header)
     centers = np.column_stack([table.numbers(name) for name in CENTER])
-    far = (np.abs(centers) > LARGEST_M).any(axis=1)
+    far = np.asarray((np.abs(centers) > LARGEST_M).any(axis=1))
     table.reject(far, f"the center is beyond {LARGEST_M:g} m")
     ids = next((name for name in IDS if name in table), None)
     object_ids = np.arange(len(table)) if ids is None else table.integers(ids)

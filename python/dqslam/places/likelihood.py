@@ -1,11 +1,11 @@
 """How much better one place explains two maps than chance does.
 
-An object of map A that is moved into map B is there with a share q of certainty, or it is not. If it
-is, its nearest object of the class is where the errors of both maps let it be, with a density N of
-their distance. If it is not, the objects of B are where they are for other reasons, with the density
+An object of map A that is moved into map B is in B with probability q. If it is, its nearest
+object of the class is where the errors of both maps let it be, with a density N of their distance.
+If it is not, the objects of B are where they are for other reasons, with the density
 ``background`` around them. The likelihood ratio of one object is ``1 - q + q N / background``. Its
-mean over random maps of that density is 1, whatever q and the errors are. The sum over a grid of
-both therefore needs no threshold: a ratio of e^s comes by chance once in e^s motions.
+mean over random maps of that density is 1, whatever q and the errors are, and so is the mean over a
+grid of both: a ratio of e^s comes by chance once in e^s motions.
 """
 
 from __future__ import annotations
@@ -110,9 +110,7 @@ class Target:
 
     def covers(self, points: Floats) -> Bools:
         """Return whether points (n, 3) are where map B is, shape (n,)."""
-        distance, _ = self._any.query(
-            points[:, : self.axes], distance_upper_bound=self._outside
-        )
+        distance, _ = self._any.query(points[:, : self.axes], distance_upper_bound=self._outside)
         return np.asarray(np.isfinite(distance))
 
 
@@ -145,9 +143,9 @@ def attribute_ratio(difference: Floats, variance: Floats, spread: float) -> Floa
 def evidence(log_ratio: Floats, covered: Bools) -> tuple[float, Floats, Floats, int]:
     """Sum the ratios of all objects over the grid; log_ratio has shape (spreads, o).
 
-    Objects of A without a partner have -inf. Returns the logarithm of the mean likelihood ratio and,
-    at the best entry of the grid, the probability of each pair to be right, the part of each object,
-    and the row of the spread.
+    Objects of A without a partner have -inf. Returns the logarithm of the mean likelihood ratio
+    and, at the best entry of the grid, the probability of each pair to be right, the part of each
+    object, and the row of the spread.
     """
     ratio = np.exp(np.minimum(log_ratio, _LARGEST_LOG))
     terms = np.log1p(SHARES[:, None, None] * (ratio[None] - 1.0))

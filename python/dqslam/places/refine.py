@@ -14,6 +14,8 @@ from dqslam.places.rigid import MotionModel, Motions
 
 _ROUNDS = 30
 _CONVERGED = 1e-9
+# Of the influence of an error: that of the few pairs of a small map may vanish by accident.
+_LEAST_SLOPE = 0.2
 # Pairs that stand for what is known before: of a class, that it errs as all do, and of all, that
 # they err as the files say.
 _BEFORE = 4.0
@@ -69,9 +71,10 @@ def refine(
         scale = scale * float(np.exp(step[-1])) if model.has_scale else scale
         if np.abs(step).max() < _CONVERGED:
             break
-    # A sample of Student's distribution says less than one of the normal with its weights.
-    lost = (FREEDOM + model.axes + 2.0) / (FREEDOM + model.axes)
-    spread = lost * np.linalg.pinv(information, hermitian=True)
+    root = np.sqrt(_lost(difference, covariance, model))
+    inverse = np.linalg.inv(root[:, :, None] * covariance * root[:, None, :])
+    information = (jacobian.swapaxes(1, 2) @ inverse @ jacobian).sum(axis=0)
+    spread = np.linalg.pinv(information, hermitian=True)
     full = _in_space(spread, model)
     motion = Motions(rotation[None], translation[None], np.array([scale]))
     for landmarks, rows, moved in ((a, rows_a, None), (b, rows_b, motion)):
@@ -117,6 +120,24 @@ def _weighted_inverse(difference: Floats, covariance: Floats, model: MotionModel
     for axis in _parts(model):
         root[:, axis] = np.sqrt(_t_weights(difference[:, axis], covariance[:, axis, axis]))[:, None]
     return np.asarray(root[:, :, None] * np.linalg.inv(covariance) * root[:, None, :])
+
+
+def _lost(difference: Floats, covariance: Floats, model: MotionModel) -> Floats:
+    """Return how much more the fit varies than the mean of errors of these covariances; (p, 3).
+
+    It is the ratio of the mean square of the influence to the squared mean of its derivative, as
+    the errors are, whether or not their distribution is Student's.
+    """
+    factor = np.ones_like(difference)
+    for axis in _parts(model):
+        size = axis.stop - axis.start
+        square = _squares(difference[:, axis], covariance[:, axis, axis])
+        weight = (FREEDOM + size) / (FREEDOM + square)
+        influence = np.mean(weight**2 * square) / size
+        slope = np.mean(weight - 2.0 * weight**2 * square / ((FREEDOM + size) * size))
+        share = max(1.0 - model.size / (3.0 * len(square)), 1.0 / len(square))
+        factor[:, axis] = max(influence, 1e-6) / max(slope, _LEAST_SLOPE) ** 2 / share
+    return factor
 
 
 def _scales(

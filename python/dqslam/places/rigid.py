@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dqslam._checks import Floats
+from dqslam._checks import Floats, Ints
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,9 +28,9 @@ class Motions:
         """Return the number of motions."""
         return len(self.scale)
 
-    def __getitem__(self, rows: object) -> Motions:
-        """Return some of them; the rows are those of an array."""
-        return Motions(self.rotation[rows], self.translation[rows], self.scale[rows])  # type: ignore[index]
+    def __getitem__(self, rows: Ints | list[int]) -> Motions:
+        """Return some of them."""
+        return Motions(self.rotation[rows], self.translation[rows], self.scale[rows])
 
     def apply(self, points: Floats) -> Floats:
         """Return points (m, n, 3) in map B, each set by its own motion; (n, 3) by all of them."""

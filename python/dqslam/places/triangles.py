@@ -1,7 +1,7 @@
 """Triangles of near objects: what two maps have in common without knowing how they lie.
 
-A motion keeps the lengths of a triangle's sides. An object that both maps have is the corner of many
-triangles with neighbors that both have, and these agree about the motion.
+A motion keeps the lengths of a triangle's sides. An object that both maps have is the corner of
+many triangles with neighbors that both have, and these agree about the motion.
 """
 
 from __future__ import annotations
@@ -56,7 +56,9 @@ def find_triangles(
     nearest = cKDTree(places).query(places[anchors], k=min(neighbors + 1, len(places)))[1]
     first, second = np.triu_indices(nearest.shape[1] - 1, 1)
     anchor = np.repeat(nearest[:, :1], len(first), axis=1).ravel()
-    corners = np.column_stack([anchor, nearest[:, 1 + first].ravel(), nearest[:, 1 + second].ravel()])
+    corners = np.column_stack(
+        [anchor, nearest[:, 1 + first].ravel(), nearest[:, 1 + second].ravel()]
+    )
     corners = corners[(corners[:, 0] != corners[:, 1]) & (corners[:, 0] != corners[:, 2])]
     if model.upright:
         a, b = (places[corners[:, i]] - places[corners[:, 0]] for i in (1, 2))
@@ -82,7 +84,7 @@ def find_triangles(
 
 
 def match_triangles(a: Triangles, b: Triangles, tolerance: float, most: int) -> tuple[Ints, Ints]:
-    """Return rows of triangles of A and of B whose classes agree, and whose sides do to a tolerance.
+    """Return rows of triangles of A and of B whose classes agree, and sides do to a tolerance.
 
     There are about ``most`` at most: then those of an evenly spread part of A's triangles.
     """
