@@ -126,13 +126,13 @@ def _align(
     why = doubt(found)
     if why:
         raise _refusal(why, found)
-    pairs, motion = found[0].pairs, found[0].motion
+    pairs, motion, freedom = found[0].pairs, found[0].motion, None
     for _ in range(_GROWTHS):
         of_maps = np.column_stack([r[pairs[:, i]] for i, r in enumerate(rows)])
-        refined = refine(a, b, of_maps, motion, model, assumed)
-        motion, before = refined.motion, pairs
+        refined = refine(a, b, of_maps, motion, model, assumed, freedom)
+        motion, freedom, before = refined.motion, refined.freedom, pairs
         variance = _variance_by_class(objects_a, pairs, refined, model)
-        pairs = match_again(objects_a, target, motion, variance)
+        pairs = match_again(objects_a, target, motion, variance, freedom)
         if len(pairs) < _FEWEST or np.array_equal(pairs, before):
             break
     return _alignment(a, b, found, of_maps, refined, model, assumed)

@@ -103,17 +103,20 @@ def lead(found: list[Hypothesis]) -> float:
     return float(ahead.sum())
 
 
-def match_again(a: Objects, target: Target, motion: Motions, variance: Floats) -> Ints:
+def match_again(
+    a: Objects, target: Target, motion: Motions, variance: Floats, freedom: float
+) -> Ints:
     """Return the pairs (p, 2) that errors of variance (o,) explain better than chance does.
 
-    Errors have Student's distribution, and as many objects are in both maps as in one.
+    Errors have Student's distribution of some degrees of freedom, and as many objects are in both
+    maps as in one.
     """
     moved = motion.apply(a.centers[None])[0]
     reach = float(np.sqrt(variance.max())) * 2.0 * _REACH
     distance, row = target.nearest(moved, a.labels, reach)
     rows = np.flatnonzero(_one_to_one(distance, row))
     partner, square = row[rows], distance[rows] ** 2
-    likely = log_student(square, variance[rows], target.axes)
+    likely = log_student(square, variance[rows], target.axes, freedom)
     met = likely > np.log(target.background[partner])
     return np.column_stack([rows[met], partner[met]])
 

@@ -24,8 +24,6 @@ SPREADS = 4.0 ** np.arange(-3.0, 2.0)
 _NEIGHBORS = 6  # of the local density: fewer are noisy, more are not local
 # An object farther from all objects of B than this many spacings is outside of B.
 _OUTSIDE = 3.0
-FREEDOM = 1.0
-"""Degrees of freedom of Student's t, Cauchy's here: errors of objects in maps have long tails."""
 _LARGEST_LOG = 500.0  # of a ratio, before it would overflow
 _LEAST_RATIO = -3.0  # logarithm for one height or size: some are simply wrong
 
@@ -119,14 +117,14 @@ def log_densities(square: Floats, variance: Floats, axes: int) -> Floats:
     return np.asarray(-0.5 * square / variance - 0.5 * axes * np.log(2.0 * np.pi * variance))
 
 
-def log_student(square: Floats, variance: Floats, axes: int) -> Floats:
+def log_student(square: Floats, variance: Floats, axes: int, freedom: float) -> Floats:
     """Return the logarithm of Student's density of squared distances."""
     from scipy.special import gammaln
 
-    half = 0.5 * (FREEDOM + axes)
-    constant = gammaln(half) - gammaln(0.5 * FREEDOM) - 0.5 * axes * np.log(FREEDOM * np.pi)
+    half = 0.5 * (freedom + axes)
+    constant = gammaln(half) - gammaln(0.5 * freedom) - 0.5 * axes * np.log(freedom * np.pi)
     spread = -0.5 * axes * np.log(variance)
-    return np.asarray(constant + spread - half * np.log1p(square / (FREEDOM * variance)))
+    return np.asarray(constant + spread - half * np.log1p(square / (freedom * variance)))
 
 
 def attribute_ratio(difference: Floats, variance: Floats, spread: float) -> Floats:

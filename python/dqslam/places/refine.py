@@ -9,11 +9,13 @@ import numpy as np
 from dqslam import _core
 from dqslam._checks import Floats, Ints
 from dqslam.places.landmarks import Landmarks
-from dqslam.places.likelihood import FREEDOM, tangent
+from dqslam.places.likelihood import log_student, tangent
 from dqslam.places.rigid import MotionModel, Motions
 
+FREEDOMS = (1.0, 2.0, 4.0, 16.0)
+"""Degrees of freedom that are tried: from Cauchy's distribution to nearly the normal one."""
 _ROUNDS = 30
-_CONVERGED = 1e-9
+_CONVERGED = 1e-8
 # Of the influence of an error: that of the few pairs of a small map may vanish by accident.
 _LEAST_SLOPE = 0.2
 # Pairs that stand for what is known before: of a class, that it errs as all do, and of all, that
@@ -35,16 +37,30 @@ class Refined:
     """Of the differences of the pairs in B, as found, square meters, (p, 3, 3)."""
     differences: Floats
     """Of the pairs, B minus moved A, meters, (p, 3)."""
+    freedom: float
+    """Degrees of freedom of the distribution of the errors."""
+    log_likelihood: float
+    """Of the differences."""
 
 
 def refine(
-    a: Landmarks, b: Landmarks, pairs: Ints, start: Motions, model: MotionModel, sigma: float
+    a: Landmarks,
+    b: Landmarks,
+    pairs: Ints,
+    start: Motions,
+    model: MotionModel,
+    sigma: float,
+    freedom: float | None = None,
 ) -> Refined:
     """Fit a motion to pairs of rows (p, 2), each with the errors of its class.
 
-    ``sigma`` [m] is that of a coordinate of a center whose covariance is unknown. The errors are
-    scaled by what is seen, by class and, where z is up, for heights apart from the plane.
+    ``sigma`` [m] is that of a coordinate of a center whose covariance is unknown. The errors have
+    Student's distribution, by default with the degrees of freedom that make them most likely. They
+    are scaled by what is seen, by class and, where z is up, for heights apart from the plane.
     """
+    if freedom is None:
+        fits = [refine(a, b, pairs, start, model, sigma, one) for one in FREEDOMS]
+        return max(fits, key=lambda fit: fit.log_likelihood)
     rows_a, rows_b = pairs.T
     p, q = a.centers[rows_a], b.centers[rows_b]
     of_class = np.unique([a.class_names[row] for row in rows_a.tolist()], return_inverse=True)[1]
@@ -56,10 +72,10 @@ def refine(
         turned = scale * rotation
         base = turned @ given[0] @ turned.T + given[1]
         difference = q - p @ turned.T - translation
-        factor = _scales(difference, base, factor, of_class, model, known)
+        factor = _scales(difference, base, factor, of_class, model, freedom, known)
         root = np.sqrt(factor)
         covariance = root[:, :, None] * base * root[:, None, :]
-        weighted = _weighted_inverse(difference, covariance, model)
+        weighted = _weighted_inverse(difference, covariance, model, freedom)
         jacobian = turned @ tangent(p, model)
         weighted = jacobian.swapaxes(1, 2) @ weighted
         information = (weighted @ jacobian).sum(axis=0)
@@ -71,7 +87,7 @@ def refine(
         scale = scale * float(np.exp(step[-1])) if model.has_scale else scale
         if np.abs(step).max() < _CONVERGED:
             break
-    root = np.sqrt(_lost(difference, covariance, model))
+    root = np.sqrt(_lost(difference, covariance, model, freedom))
     inverse = np.linalg.inv(root[:, :, None] * covariance * root[:, None, :])
     information = (jacobian.swapaxes(1, 2) @ inverse @ jacobian).sum(axis=0)
     spread = np.linalg.pinv(information, hermitian=True)
@@ -88,7 +104,22 @@ def refine(
         scale_sigma=float(np.sqrt(spread[-1, -1])) if model.has_scale else 0.0,
         pair_covariances=covariance,
         differences=q - p @ (scale * rotation).T - translation,
+        freedom=freedom,
+        log_likelihood=_log_likelihood(difference, covariance, model, freedom),
     )
+
+
+def _log_likelihood(
+    difference: Floats, covariance: Floats, model: MotionModel, freedom: float
+) -> float:
+    total = 0.0
+    for axis in _parts(model):
+        given = covariance[:, axis, axis]
+        square, (_, logdet) = _squares(difference[:, axis], given), np.linalg.slogdet(given)
+        size = axis.stop - axis.start
+        ones = np.ones(len(square))
+        total += float((log_student(square, ones, size, freedom) - 0.5 * logdet).sum())
+    return total
 
 
 def _filled(covariances: Floats, sigma: float) -> Floats:
@@ -103,10 +134,10 @@ def _parts(model: MotionModel) -> list[slice]:
     return [slice(0, 2), slice(2, 3)] if model.upright else [slice(0, 3)]
 
 
-def _t_weights(difference: Floats, covariance: Floats) -> Floats:
+def _t_weights(difference: Floats, covariance: Floats, freedom: float) -> Floats:
     """Return the weights (p,) of Student's t for differences (p, k) of covariances (p, k, k)."""
     square = _squares(difference, covariance)
-    return np.asarray((FREEDOM + difference.shape[1]) / (FREEDOM + square))
+    return np.asarray((freedom + difference.shape[1]) / (freedom + square))
 
 
 def _squares(difference: Floats, covariance: Floats) -> Floats:
@@ -114,15 +145,19 @@ def _squares(difference: Floats, covariance: Floats) -> Floats:
     return np.asarray((difference * solved).sum(axis=1))
 
 
-def _weighted_inverse(difference: Floats, covariance: Floats, model: MotionModel) -> Floats:
+def _weighted_inverse(
+    difference: Floats, covariance: Floats, model: MotionModel, freedom: float
+) -> Floats:
     """Return the inverses of covariances (p, 3, 3), each axis with the weight of its part."""
     root = np.ones_like(difference)
     for axis in _parts(model):
-        root[:, axis] = np.sqrt(_t_weights(difference[:, axis], covariance[:, axis, axis]))[:, None]
+        root[:, axis] = np.sqrt(
+            _t_weights(difference[:, axis], covariance[:, axis, axis], freedom)
+        )[:, None]
     return np.asarray(root[:, :, None] * np.linalg.inv(covariance) * root[:, None, :])
 
 
-def _lost(difference: Floats, covariance: Floats, model: MotionModel) -> Floats:
+def _lost(difference: Floats, covariance: Floats, model: MotionModel, freedom: float) -> Floats:
     """Return how much more the fit varies than the mean of errors of these covariances; (p, 3).
 
     It is the ratio of the mean square of the influence to the squared mean of its derivative, as
@@ -132,9 +167,9 @@ def _lost(difference: Floats, covariance: Floats, model: MotionModel) -> Floats:
     for axis in _parts(model):
         size = axis.stop - axis.start
         square = _squares(difference[:, axis], covariance[:, axis, axis])
-        weight = (FREEDOM + size) / (FREEDOM + square)
+        weight = (freedom + size) / (freedom + square)
         influence = np.mean(weight**2 * square) / size
-        slope = np.mean(weight - 2.0 * weight**2 * square / ((FREEDOM + size) * size))
+        slope = np.mean(weight - 2.0 * weight**2 * square / ((freedom + size) * size))
         share = max(1.0 - model.size / (3.0 * len(square)), 1.0 / len(square))
         factor[:, axis] = max(influence, 1e-6) / max(slope, _LEAST_SLOPE) ** 2 / share
     return factor
@@ -146,13 +181,14 @@ def _scales(
     factor: Floats,
     of_class: Ints,
     model: MotionModel,
+    freedom: float,
     known: bool,
 ) -> Floats:
     """Return factors (p, 3) on the variances of each axis, from those before."""
     result = np.ones_like(factor)
     for axis in _parts(model):
         part, given = difference[:, axis], base[:, axis, axis]
-        weight = _t_weights(part, given * factor[:, axis][:, :1, None])
+        weight = _t_weights(part, given * factor[:, axis][:, :1, None], freedom)
         each = weight * _squares(part, given) / part.shape[1]
         # The motion fits its own degrees of freedom.
         share = max(1.0 - model.size / (3.0 * len(each)), 1.0 / len(each))
