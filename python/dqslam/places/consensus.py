@@ -65,6 +65,18 @@ def align(
     Alignment(se2, 12 pairs, 0.03 m apart)
     """
     a, b = (x if isinstance(x, Landmarks) else read_landmarks(x) for x in (a, b))
+    return align_landmarks(a, b, motion=motion, scale=scale, sigma=sigma)[0]
+
+
+def align_landmarks(
+    a: Landmarks,
+    b: Landmarks,
+    *,
+    motion: MotionName = "auto",
+    scale: bool = False,
+    sigma: float | None = None,
+) -> tuple[Alignment, Refined]:
+    """Align maps as ``align`` does; return how the motion was fitted, too."""
     if sigma is not None and not (np.isfinite(sigma) and sigma > 0.0):
         raise ValueError(f"sigma is {sigma:g} m, not positive")
     if motion not in ("auto", "se2", "se3"):
@@ -111,7 +123,7 @@ def _align(
     rows: tuple[Ints, Ints],
     model: MotionModel,
     sigma: float | None,
-) -> Alignment:
+) -> tuple[Alignment, Refined]:
     room = max(spacing(x.centers[r], model.axes) for x, r in zip((a, b), rows, strict=True))
     assumed = SIGMA_OF_SPACING * room if sigma is None else sigma
     labels = {name: number for number, name in enumerate(sorted(set(a.class_names)))}
@@ -132,10 +144,10 @@ def _align(
         refined = refine(a, b, of_maps, motion, model, assumed, freedom)
         motion, freedom, before = refined.motion, refined.freedom, pairs
         variance = _variance_by_class(objects_a, pairs, refined, model)
-        pairs = match_again(objects_a, target, motion, variance, freedom)
+        pairs = match_again(objects_a, target, motion, variance, freedom[0])
         if len(pairs) < _FEWEST or np.array_equal(pairs, before):
             break
-    return _alignment(a, b, found, of_maps, refined, model, assumed)
+    return _alignment(a, b, found, of_maps, refined, model, assumed), refined
 
 
 def _variance_by_class(

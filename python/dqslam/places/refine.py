@@ -31,16 +31,21 @@ class Refined:
     """A batch of one."""
     covariance: Floats
     """Of a small motion in the frame of A, x y z [m] and rotation vector [rad], (6, 6)."""
+    independent: Floats
+    """The part of it that is not of a map as a whole, (6, 6)."""
     scale_sigma: float
     """Of the logarithm of the scale; 0 if it is 1."""
     pair_covariances: Floats
     """Of the differences of the pairs in B, as found, square meters, (p, 3, 3)."""
+    factors: Floats
+    """How much larger the variances are than the files say, of each pair and axis, (p, 3)."""
     differences: Floats
     """Of the pairs, B minus moved A, meters, (p, 3)."""
-    freedom: float
-    """Degrees of freedom of the distribution of the errors."""
-    log_likelihood: float
-    """Of the differences."""
+    freedom: tuple[float, ...]
+    """Degrees of freedom of the distribution of the errors: in the plane and of heights if z is up,
+    else of all."""
+    log_likelihoods: tuple[float, ...]
+    """Of the differences, likewise."""
 
 
 def refine(
@@ -50,7 +55,7 @@ def refine(
     start: Motions,
     model: MotionModel,
     sigma: float,
-    freedom: float | None = None,
+    freedom: tuple[float, ...] | None = None,
 ) -> Refined:
     """Fit a motion to pairs of rows (p, 2), each with the errors of its class.
 
@@ -59,8 +64,10 @@ def refine(
     are scaled by what is seen, by class and, where z is up, for heights apart from the plane.
     """
     if freedom is None:
-        fits = [refine(a, b, pairs, start, model, sigma, one) for one in FREEDOMS]
-        return max(fits, key=lambda fit: fit.log_likelihood)
+        parts = len(_parts(model))
+        fits = [refine(a, b, pairs, start, model, sigma, (one,) * parts) for one in FREEDOMS]
+        likely = np.argmax([fit.log_likelihoods for fit in fits], axis=0).tolist()
+        freedom = tuple(FREEDOMS[row] for row in likely)
     rows_a, rows_b = pairs.T
     p, q = a.centers[rows_a], b.centers[rows_b]
     of_class = np.unique([a.class_names[row] for row in rows_a.tolist()], return_inverse=True)[1]
@@ -91,7 +98,8 @@ def refine(
     inverse = np.linalg.inv(root[:, :, None] * covariance * root[:, None, :])
     information = (jacobian.swapaxes(1, 2) @ inverse @ jacobian).sum(axis=0)
     spread = np.linalg.pinv(information, hermitian=True)
-    full = _in_space(spread, model)
+    independent = _in_space(spread, model)
+    full = independent
     motion = Motions(rotation[None], translation[None], np.array([scale]))
     for landmarks, rows, moved in ((a, rows_a, None), (b, rows_b, motion)):
         if landmarks.shares_errors and landmarks.has_covariance[rows].all() and len(rows) > 3:
@@ -101,25 +109,26 @@ def refine(
     return Refined(
         motion=motion,
         covariance=0.5 * (full + full.T),
+        independent=independent,
         scale_sigma=float(np.sqrt(spread[-1, -1])) if model.has_scale else 0.0,
         pair_covariances=covariance,
+        factors=factor,
         differences=q - p @ (scale * rotation).T - translation,
         freedom=freedom,
-        log_likelihood=_log_likelihood(difference, covariance, model, freedom),
+        log_likelihoods=_log_likelihoods(difference, covariance, model, freedom),
     )
 
 
-def _log_likelihood(
-    difference: Floats, covariance: Floats, model: MotionModel, freedom: float
-) -> float:
-    total = 0.0
-    for axis in _parts(model):
+def _log_likelihoods(
+    difference: Floats, covariance: Floats, model: MotionModel, freedom: tuple[float, ...]
+) -> tuple[float, ...]:
+    likelihoods = []
+    for axis, free in zip(_parts(model), freedom, strict=True):
         given = covariance[:, axis, axis]
         square, (_, logdet) = _squares(difference[:, axis], given), np.linalg.slogdet(given)
-        size = axis.stop - axis.start
-        ones = np.ones(len(square))
-        total += float((log_student(square, ones, size, freedom) - 0.5 * logdet).sum())
-    return total
+        one = log_student(square, np.ones(len(square)), axis.stop - axis.start, free)
+        likelihoods.append(float((one - 0.5 * logdet).sum()))
+    return tuple(likelihoods)
 
 
 def _filled(covariances: Floats, sigma: float) -> Floats:
@@ -146,30 +155,32 @@ def _squares(difference: Floats, covariance: Floats) -> Floats:
 
 
 def _weighted_inverse(
-    difference: Floats, covariance: Floats, model: MotionModel, freedom: float
+    difference: Floats, covariance: Floats, model: MotionModel, freedom: tuple[float, ...]
 ) -> Floats:
     """Return the inverses of covariances (p, 3, 3), each axis with the weight of its part."""
     root = np.ones_like(difference)
-    for axis in _parts(model):
-        root[:, axis] = np.sqrt(
-            _t_weights(difference[:, axis], covariance[:, axis, axis], freedom)
-        )[:, None]
+    for axis, free in zip(_parts(model), freedom, strict=True):
+        root[:, axis] = np.sqrt(_t_weights(difference[:, axis], covariance[:, axis, axis], free))[
+            :, None
+        ]
     return np.asarray(root[:, :, None] * np.linalg.inv(covariance) * root[:, None, :])
 
 
-def _lost(difference: Floats, covariance: Floats, model: MotionModel, freedom: float) -> Floats:
+def _lost(
+    difference: Floats, covariance: Floats, model: MotionModel, freedom: tuple[float, ...]
+) -> Floats:
     """Return how much more the fit varies than the mean of errors of these covariances; (p, 3).
 
     It is the ratio of the mean square of the influence to the squared mean of its derivative, as
     the errors are, whether or not their distribution is Student's.
     """
     factor = np.ones_like(difference)
-    for axis in _parts(model):
+    for axis, free in zip(_parts(model), freedom, strict=True):
         size = axis.stop - axis.start
         square = _squares(difference[:, axis], covariance[:, axis, axis])
-        weight = (freedom + size) / (freedom + square)
+        weight = (free + size) / (free + square)
         influence = np.mean(weight**2 * square) / size
-        slope = np.mean(weight - 2.0 * weight**2 * square / ((freedom + size) * size))
+        slope = np.mean(weight - 2.0 * weight**2 * square / ((free + size) * size))
         share = max(1.0 - model.size / (3.0 * len(square)), 1.0 / len(square))
         factor[:, axis] = max(influence, 1e-6) / max(slope, _LEAST_SLOPE) ** 2 / share
     return factor
@@ -181,14 +192,14 @@ def _scales(
     factor: Floats,
     of_class: Ints,
     model: MotionModel,
-    freedom: float,
+    freedom: tuple[float, ...],
     known: bool,
 ) -> Floats:
     """Return factors (p, 3) on the variances of each axis, from those before."""
     result = np.ones_like(factor)
-    for axis in _parts(model):
+    for axis, free in zip(_parts(model), freedom, strict=True):
         part, given = difference[:, axis], base[:, axis, axis]
-        weight = _t_weights(part, given * factor[:, axis][:, :1, None], freedom)
+        weight = _t_weights(part, given * factor[:, axis][:, :1, None], free)
         each = weight * _squares(part, given) / part.shape[1]
         # The motion fits its own degrees of freedom.
         share = max(1.0 - model.size / (3.0 * len(each)), 1.0 / len(each))
