@@ -82,7 +82,9 @@ if TYPE_CHECKING:  # the one list of public names, a line each: lazy_exports rea
     from dqslam.places import Alignment as Alignment
     from dqslam.places import CannotTellError as CannotTellError
     from dqslam.places import Landmarks as Landmarks
+    from dqslam.places import MergedMap as MergedMap
     from dqslam.places import align as align
+    from dqslam.places import merge as merge
     from dqslam.places import read_landmarks as read_landmarks
     from dqslam.plot import plot_maps as plot_maps
     from dqslam.recording import AbsolutePositions as AbsolutePositions

@@ -29,6 +29,8 @@ def landmarks(
         covariances=np.full((count, 3, 3), np.nan) if covariances is None else covariances,
         semi_axes=unknown if semi_axes is None else semi_axes,
         log_semi_axes_sigmas=unknown,
+        orientations=np.full((count, 4), np.nan),
+        observations=np.ones(count, dtype=np.int64),
         shares_errors=shares_errors,
     )
 

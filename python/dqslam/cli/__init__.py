@@ -23,6 +23,7 @@ from dqslam.cli.degeneracy import degeneracy
 from dqslam.cli.demo import demo
 from dqslam.cli.evaluate import evaluate
 from dqslam.cli.inspect import inspect
+from dqslam.cli.merge import merge
 from dqslam.cli.paper import paper
 from dqslam.cli.plot import plot
 from dqslam.cli.run import run
@@ -35,7 +36,7 @@ from dqslam.cli.worlds import worlds
 COMMANDS: dict[str, tuple[Callable[..., None], ...]] = {
     "Start here": (demo, paper, simulate),
     "Your recording": (inspect, convert, run, evaluate),
-    "Places": (align,),
+    "Places": (align, merge),
     "Look": (plot, view),
     "Study": (sweep, worlds, ablation, degeneracy),
 }

@@ -40,7 +40,7 @@ def fuse(a: Landmarks, b: Landmarks, found: Alignment, refined: Refined) -> Fuse
     common, and for errors of each object that are independent. The motion of B is in the alignment,
     that of A stays; of the others, those of both maps and of the alignment are weighed.
     """
-    inverse = np.linalg.inv(found.b_from_a)
+    inverse = np.asarray(np.linalg.inv(found.b_from_a), dtype=np.float64)
     inflation = max(1.0, float(np.median(refined.factors)))
     whole, own_a = _parts(a, refined, inflation)
     _, own_b = _parts(b, refined, inflation)
@@ -66,11 +66,15 @@ def fuse(a: Landmarks, b: Landmarks, found: Alignment, refined: Refined) -> Fuse
     jacobian = tangent(centers, _SPACE)
     full = np.concatenate([own, own_b[alone]]) + jacobian @ whole @ jacobian.swapaxes(1, 2)
     scaled = b.semi_axes / found.scale
+    turns = _turned(b.orientations, inverse[:3, :3] * found.scale)
     sigmas = [np.where(np.isfinite(x), x, np.inf).sum(axis=1) for x in _sigmas(a, b)]
     better = ~np.isfinite(a.semi_axes[pairs_a]).all(axis=1)
     better |= sigmas[1][pairs_b] < sigmas[0][pairs_a]
     better &= np.isfinite(scaled[pairs_b]).all(axis=1)
     semi_axes, log_sigmas = a.semi_axes.copy(), a.log_semi_axes_sigmas.copy()
+    orientations, observations = a.orientations.copy(), a.observations.copy()
+    observations[pairs_a] += b.observations[pairs_b]
+    orientations[pairs_a[better]] = turns[pairs_b[better]]
     semi_axes[pairs_a[better]] = scaled[pairs_b[better]]
     log_sigmas[pairs_a[better]] = b.log_semi_axes_sigmas[pairs_b[better]]
     new = int(a.object_ids.max()) + 1 + np.arange(len(alone))
@@ -83,6 +87,8 @@ def fuse(a: Landmarks, b: Landmarks, found: Alignment, refined: Refined) -> Fuse
         covariances=0.5 * (full + full.swapaxes(1, 2)),
         semi_axes=np.concatenate([semi_axes, scaled[alone]]),
         log_semi_axes_sigmas=np.concatenate([log_sigmas, b.log_semi_axes_sigmas[alone]]),
+        orientations=np.concatenate([orientations, turns[alone]]),
+        observations=np.concatenate([observations, b.observations[alone]]),
         shares_errors=True,
         results=None,
     )
@@ -93,6 +99,18 @@ def fuse(a: Landmarks, b: Landmarks, found: Alignment, refined: Refined) -> Fuse
         covariance=refined.independent + whole,
         shape_from_b=pairs_a[better],
     )
+
+
+def _turned(orientations: Floats, rotation: Floats) -> Floats:
+    """Return orientations (o, 4) in another frame; NaN stays."""
+    from scipy.spatial.transform import Rotation
+
+    turned = np.full_like(orientations, np.nan)
+    known = np.isfinite(orientations).all(axis=1)
+    if known.any():
+        frame = Rotation.from_matrix(rotation)
+        turned[known] = (frame * Rotation.from_quat(orientations[known])).as_quat()
+    return turned
 
 
 def _sigmas(a: Landmarks, b: Landmarks) -> tuple[Floats, Floats]:

@@ -57,6 +57,10 @@ class Landmarks:
     """Descending, meters, shape (o, 3); NaN if unknown."""
     log_semi_axes_sigmas: Floats
     """Sigmas of the natural logarithms of the semi-axes, shape (o, 3); NaN if unknown."""
+    orientations: Floats
+    """map_from_object, x y z w, shape (o, 4); NaN if unknown."""
+    observations: Ints
+    """Number of boxes that showed each object, 0 if unknown, shape (o,)."""
     shares_errors: bool
     """Whether the covariances are of one estimate, whose first pose is exact: the errors of its
     objects then have a part in common, which one row for each object does not show."""
@@ -122,6 +126,8 @@ def _of_objects(objects: MapObjects, name: str, results: Results | None) -> Land
         covariances=objects.center_covariances,
         semi_axes=objects.semi_axes,
         log_semi_axes_sigmas=objects.log_semi_axes_sigmas,
+        orientations=objects.orientations,
+        observations=objects.observations,
         shares_errors=True,
         results=results,
     )
@@ -137,6 +143,8 @@ def _of_estimate(estimate: Estimate) -> Landmarks:
         covariances=np.full((count, 3, 3), np.nan),
         semi_axes=estimate.semi_axes,
         log_semi_axes_sigmas=np.full((count, 3), np.nan),
+        orientations=estimate.orientations,
+        observations=estimate.observations,
         shares_errors=True,
     )
 
@@ -163,6 +171,8 @@ def _of_csv(path: Path) -> Landmarks:
         covariances=_covariances(table),
         semi_axes=_semi_axes(table),
         log_semi_axes_sigmas=np.full((len(table), 3), np.nan),
+        orientations=np.full((len(table), 4), np.nan),
+        observations=np.zeros(len(table), dtype=np.int64),
         shares_errors=False,
     )
 
