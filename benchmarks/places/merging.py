@@ -1,4 +1,4 @@
-"""Merged maps of two robots: whether they are found, right, honest and better than one map alone."""
+"""Merged maps of two robots: found, right, honest, and better than one map alone."""
 
 from __future__ import annotations
 

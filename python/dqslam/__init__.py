@@ -81,10 +81,12 @@ if TYPE_CHECKING:  # the one list of public names, a line each: lazy_exports rea
     from dqslam.pipeline import run_files as run_files
     from dqslam.places import Alignment as Alignment
     from dqslam.places import CannotTellError as CannotTellError
+    from dqslam.places import JointMap as JointMap
     from dqslam.places import Landmarks as Landmarks
     from dqslam.places import MergedMap as MergedMap
     from dqslam.places import align as align
     from dqslam.places import merge as merge
+    from dqslam.places import merge_graphs as merge_graphs
     from dqslam.places import read_landmarks as read_landmarks
     from dqslam.plot import plot_maps as plot_maps
     from dqslam.recording import AbsolutePositions as AbsolutePositions

@@ -9,6 +9,8 @@ from dqslam.places.consensus import align as align
 from dqslam.places.joining import MergedMap as MergedMap
 from dqslam.places.joining import Part as Part
 from dqslam.places.joining import merge as merge
+from dqslam.places.joint import JointMap as JointMap
+from dqslam.places.joint import merge_graphs as merge_graphs
 from dqslam.places.landmarks import Landmarks as Landmarks
 from dqslam.places.landmarks import read_landmarks as read_landmarks
 from dqslam.places.merged_files import MERGE_FILE as MERGE_FILE

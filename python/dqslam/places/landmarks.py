@@ -21,6 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
+from dqslam import _core
 from dqslam._checks import Bools, Floats, Ints, as_covariances
 from dqslam._repr import counted
 from dqslam.estimate import Estimate
@@ -93,7 +94,7 @@ def read_landmarks(source: Source) -> Landmarks:
         If the source is neither a path nor a map.
     """
     if isinstance(source, Estimate):
-        return _of_estimate(source)
+        return landmarks_of(source)
     if isinstance(source, MapObjects):
         return _of_objects(source, "map", None)
     if isinstance(source, Results):
@@ -133,16 +134,24 @@ def _of_objects(objects: MapObjects, name: str, results: Results | None) -> Land
     )
 
 
-def _of_estimate(estimate: Estimate) -> Landmarks:
+def landmarks_of(estimate: Estimate, objects: Floats | None = None) -> Landmarks:
+    """Return the objects of an estimate, with their covariances (o, 9, 9) as in ``Marginals``."""
     count = len(estimate.object_ids)
+    centers, sigmas = np.full((count, 3, 3), np.nan), np.full((count, 3), np.nan)
+    if objects is not None:
+        known = np.isfinite(objects).all(axis=(1, 2)) & estimate.is_ellipsoid
+        for row in np.flatnonzero(known):
+            centers[row] = objects[row, :3, :3]
+            jacobian = _core.log_semi_axes_jacobian(estimate.ellipsoids[row])
+            sigmas[row] = np.sqrt(np.diagonal(jacobian @ objects[row] @ jacobian.T))
     return Landmarks(
         name="estimate",
         object_ids=estimate.object_ids,
         class_names=estimate.class_names,
         centers=estimate.centers,
-        covariances=np.full((count, 3, 3), np.nan),
+        covariances=centers,
         semi_axes=estimate.semi_axes,
-        log_semi_axes_sigmas=np.full((count, 3), np.nan),
+        log_semi_axes_sigmas=sigmas,
         orientations=estimate.orientations,
         observations=estimate.observations,
         shares_errors=True,
