@@ -9,19 +9,26 @@ import numpy as np
 import typer
 from rich.console import Console
 
-from benchmarks.places import merging
+from benchmarks.places import merging, real
 
-_CASES = ("robots",)
+_CASES = ("robots", "real")
 
 
 def places(
     case: Annotated[str, typer.Argument(help=f"One of {', '.join(_CASES)}.")] = "robots",
-    trials: Annotated[int, typer.Option(min=1, help="Pairs of robots.")] = 200,
+    trials: Annotated[int, typer.Option(min=1, help="Pairs of robots, or draws of a frame.")] = 200,
     seed: Annotated[int, typer.Option(min=0, help="Of the first pair.")] = 0,
 ) -> None:
     """Measure how often maps of two robots are aligned, and how good the merged map is."""
     if case not in _CASES:
         raise typer.BadParameter(f"no case {case!r}; there are: {', '.join(_CASES)}")
+    if case == "real":
+        say = Console(soft_wrap=True).print
+        say("| maps | | turn [deg] | shift [m] |\n|---|---|---|---|")
+        for place in real.PLACES:
+            for row in real.pairs(place, trials):
+                say(row)
+        return
     found = []
     for number in range(seed, seed + trials):
         found.append(merging.run(number))
