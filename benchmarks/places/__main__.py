@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from functools import partial
 from typing import Annotated
 
 import numpy as np
@@ -23,7 +24,7 @@ def places(
     if case not in _CASES:
         raise typer.BadParameter(f"no case {case!r}; there are: {', '.join(_CASES)}")
     if case == "real":
-        say = Console(soft_wrap=True).print
+        say = partial(Console(soft_wrap=True).print, markup=False, highlight=False)
         say("| maps | | turn [deg] | shift [m] |\n|---|---|---|---|")
         for place in real.PLACES:
             for row in real.pairs(place, trials):
@@ -39,7 +40,7 @@ def places(
 def show(found: list[merging.Trial]) -> None:
     """Print the table of all pairs."""
     aligned = [one for one in found if not one.refused]
-    say = Console(soft_wrap=True).print
+    say = partial(Console(soft_wrap=True).print, markup=False, highlight=False)
     say(f"pairs of robots: {len(found)}, refused: {len(found) - len(aligned)}")
     if not aligned:
         return

@@ -166,4 +166,5 @@ def test_three_robots_on_a_real_car_park_agree_around_a_loop():
     for a, b in ((one, two), (two, three), (three, one)):
         loop = dq.align(a, b).b_from_a @ loop
     assert np.degrees(abs(np.arctan2(loop[1, 0], loop[0, 0]))) < 0.07
-    assert np.hypot(*loop[:2, 3]) < 0.04
+    middle = np.append(dq.read_landmarks(one).centers.mean(axis=0), 1.0)
+    assert np.hypot(*(loop @ middle - middle)[:2]) < 0.04
