@@ -6,6 +6,9 @@ Two robots map one place, each in a frame of its own. :func:`dqslam.align` finds
 to each other from the objects that both have, and :func:`dqslam.merge` makes one map of both.
 """
 
+import tempfile
+from pathlib import Path
+
 import matplotlib.pyplot as plt
 import numpy as np
 
@@ -24,6 +27,8 @@ yaw = 2.1
 turn = np.array(
     [[np.cos(yaw), -np.sin(yaw), 0.0], [np.sin(yaw), np.cos(yaw), 0.0], [0.0, 0.0, 1.0]]
 )
+temporary = tempfile.TemporaryDirectory()
+first, second, other = (Path(temporary.name) / f"{name}.csv" for name in ("a", "b", "c"))
 maps = {}
 for name, rows in (("first", np.arange(18)), ("second", np.arange(8, 26))):
     centers = world[rows] + random.normal(0.0, 0.1, (len(rows), 3))
@@ -31,14 +36,15 @@ for name, rows in (("first", np.arange(18)), ("second", np.arange(8, 26))):
         centers = centers @ turn.T + [35.0, 2.0, 0.5]
     maps[name] = centers
     table = np.column_stack([classes[rows], centers])
-    np.savetxt(f"{name}.csv", table, delimiter=",", header="class_id,x,y,z", comments="")
+    path = first if name == "first" else second
+    np.savetxt(path, table, delimiter=",", header="class_id,x,y,z", comments="")
 
 # %%
 # The motion between them
 # -----------------------
 # The evidence is the logarithm of the odds against chance, and the runner-up the best other motion.
 
-found = dq.align("first.csv", "second.csv")
+found = dq.align(first, second)
 print(found)
 print(np.round(found.b_from_a, 3))
 print(f"evidence {found.evidence:.1f}, of the runner-up {found.runner_up.evidence:.1f}")
@@ -48,7 +54,7 @@ print(f"evidence {found.evidence:.1f}, of the runner-up {found.runner_up.evidenc
 # -------
 # Objects that both maps have are joined. The frame is that of the first map.
 
-merged = dq.merge("first.csv", "second.csv")
+merged = dq.merge(first, second)
 centers = merged.landmarks.centers
 back = np.linalg.inv(found.b_from_a)
 moved = maps["second"] @ back[:3, :3].T + back[:3, 3]
@@ -71,10 +77,10 @@ plt.show()
 # -----------------------
 # Other objects are no place that both have been at, and the reason is a sentence.
 
-other = np.column_stack([random.uniform(0.0, 30.0, (18, 2)), random.normal(0.0, 0.3, 18)])
-table = np.column_stack([classes[:18], other])
-np.savetxt("other.csv", table, delimiter=",", header="class_id,x,y,z", comments="")
+elsewhere = np.column_stack([random.uniform(0.0, 30.0, (18, 2)), random.normal(0.0, 0.3, 18)])
+table = np.column_stack([classes[:18], elsewhere])
+np.savetxt(other, table, delimiter=",", header="class_id,x,y,z", comments="")
 try:
-    dq.align("first.csv", "other.csv")
+    dq.align(first, other)
 except dq.CannotTellError as error:
     print(error)
