@@ -16,6 +16,7 @@ if TYPE_CHECKING:  # the one list of public names, a line each: lazy_exports rea
     from dqslam import metrics as metrics
     from dqslam import online as online
     from dqslam import pipeline as pipeline
+    from dqslam import places as places
     from dqslam import plot as plot
     from dqslam import simulation as simulation
     from dqslam import studies as studies
@@ -81,6 +82,15 @@ if TYPE_CHECKING:  # the one list of public names, a line each: lazy_exports rea
     from dqslam.pipeline import RunResult as RunResult
     from dqslam.pipeline import run as run
     from dqslam.pipeline import run_files as run_files
+    from dqslam.places import Alignment as Alignment
+    from dqslam.places import CannotTellError as CannotTellError
+    from dqslam.places import JointMap as JointMap
+    from dqslam.places import Landmarks as Landmarks
+    from dqslam.places import MergedMap as MergedMap
+    from dqslam.places import align as align
+    from dqslam.places import merge as merge
+    from dqslam.places import merge_graphs as merge_graphs
+    from dqslam.places import read_landmarks as read_landmarks
     from dqslam.plot import plot_maps as plot_maps
     from dqslam.recording import AbsolutePositions as AbsolutePositions
     from dqslam.recording import Detections as Detections

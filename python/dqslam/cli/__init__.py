@@ -17,12 +17,14 @@ from dqslam._manifest import ChangedFileWarning
 from dqslam._repr import printable
 from dqslam._version import version
 from dqslam.cli.ablation import ablation
+from dqslam.cli.align import align
 from dqslam.cli.convert import convert
 from dqslam.cli.degeneracy import degeneracy
 from dqslam.cli.demo import demo
 from dqslam.cli.detect import detect
 from dqslam.cli.evaluate import evaluate
 from dqslam.cli.inspect import inspect
+from dqslam.cli.merge import merge
 from dqslam.cli.paper import paper
 from dqslam.cli.plot import plot
 from dqslam.cli.run import run
@@ -35,6 +37,7 @@ from dqslam.cli.worlds import worlds
 COMMANDS: dict[str, tuple[Callable[..., None], ...]] = {
     "Start here": (demo, paper, simulate),
     "Your recording": (detect, inspect, convert, run, evaluate),
+    "Places": (align, merge),
     "Look": (plot, view),
     "Study": (sweep, worlds, ablation, degeneracy),
 }
@@ -42,7 +45,8 @@ EXIT_CODES = {
     0: "done",
     1: "a mistake in dqslam itself; its traceback is shown",
     2: "bad input: options, files, or a problem that they do not determine",
-    3: "done, but the result of `run` is doubtful, or `inspect --strict` has found a mistake",
+    3: "done, but the result of `run` is doubtful, `inspect --strict` has found a mistake, or "
+    "maps do not say whether they are of one place",
     130: "stopped by Ctrl-C",
     141: "stopped, because the reader of its output has gone",
 }

@@ -18,4 +18,5 @@ from dqslam.io.results.load import MapObjects as MapObjects
 from dqslam.io.results.load import Results as Results
 from dqslam.io.results.load import load_map_results as load_map_results
 from dqslam.io.results.load import load_results as load_results
+from dqslam.io.results.load import read_map as read_map
 from dqslam.io.results.save import save_estimate as save_estimate

@@ -184,7 +184,7 @@ def _read_results(directory: Path) -> Results:
         covariances=read_covariances(covariance, times)
         if covariance.exists()
         else np.full((len(times), 6, 6), np.nan),
-        objects=_read_map(directory / "map.json"),
+        objects=read_map(directory / "map.json"),
         boxes=read_boxes(boxes, times) if boxes.exists() else None,
         report=_read_json(report) if report.exists() else {},
     )
@@ -210,7 +210,9 @@ def _read_json(path: Path) -> dict[str, Any]:
     return content
 
 
-def _read_map(path: Path) -> MapObjects:
+def read_map(path: str | Path) -> MapObjects:
+    """Read a ``map.json``; an error names the file and the row of the object."""
+    path = Path(path)
     content = _read_json(path)
     objects = content.get("objects")
     if not isinstance(objects, list) or not all(isinstance(entry, dict) for entry in objects):

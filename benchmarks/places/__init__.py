@@ -1,0 +1,1 @@
+"""Studies of places: a case for each file."""
