@@ -22,6 +22,7 @@ from dqslam.pipeline.report import (
     box_chi2,
     describe_box_noise,
     describe_boxes,
+    describe_calibration,
     describe_objects,
     describe_size_prior,
     describe_solver,
@@ -66,7 +67,9 @@ class EstimatorOutput:
     remarks: tuple[str, ...] = ()
     """What was noticed on the way, a sentence each."""
     calibration: tuple[CalibrationFinding, ...] = ()
-    """What the boxes say about camera, mount and odometry."""
+    """What the boxes say about camera, mount and odometry, which were taken for known."""
+    estimated: tuple[CalibrationFinding, ...] = ()
+    """What was estimated of them, and used."""
     live_poses: Floats | None = None
     """Of a session, before its last polish: world_from_robot, shape (n, d)."""
     step_ms: Floats | None = None
@@ -151,6 +154,7 @@ def conclude(
         if noise is None
         else {"from": "estimated"} | asdict(noise) | {"levels": output.noise_levels},
         "calibration": [asdict(finding) for finding in output.calibration],
+        "estimated_calibration": describe_calibration(output.estimated),
         "under_constrained": [str(part) for part in output.marginals.under_constrained]
         if output.marginals
         else [],

@@ -99,6 +99,13 @@ def warn_of_calibration(findings: tuple[CalibrationFinding, ...]) -> list[str]:
     return [str(finding) for finding in findings if finding.sigmas > SURE_OF_CALIBRATION]
 
 
+def describe_calibration(estimated: tuple[CalibrationFinding, ...]) -> dict[str, Any]:
+    """Describe what was estimated of the calibration, by the names of its parameters."""
+    return {
+        one.name: {"value": one.value, "sigma": one.sigma, "unit": one.unit} for one in estimated
+    }
+
+
 def describe_box_noise(noise: BoxNoise, repeated: RepeatedNoise | None) -> dict[str, Any]:
     """Describe the noise of an edge, and its parts where they were estimated."""
     if repeated is None:
