@@ -47,6 +47,9 @@ class Estimate:
     """Whether the chi-square of each box is at most `outlier_chi_square`, shape (b,)."""
     dropped: Mapping[int, str] = field(default_factory=dict)
     """Reasons why objects are not in the map, by id."""
+    contradicted: Mapping[int, str] = field(default_factory=dict)
+    """Mapped objects that their own boxes contradict, with the reason, by id: most of their boxes
+    do not fit, or they are where another object is. Their ids are likely wrong."""
 
     def __repr__(self) -> str:
         """Show the pose model, and how many poses and objects there are."""
@@ -54,6 +57,8 @@ class Estimate:
         parts.append(counted(len(self.object_ids), "object"))
         if self.dropped:
             parts.append(f"{len(self.dropped)} dropped")
+        if self.contradicted:
+            parts.append(f"{len(self.contradicted)} contradicted")
         return f"Estimate({', '.join(parts)})"
 
     @property

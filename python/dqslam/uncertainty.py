@@ -3,7 +3,7 @@
 The first pose is fixed, and everything is relative to it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -78,6 +78,8 @@ def marginal_covariances(
     """Return the covariances of an estimate's poses and mapped objects.
 
     The options are those of the solve. With a robust loss, boxes that do not fit are left out.
+    An object in `Estimate.contradicted` may be at the place of any other: the mean of the outer
+    products of the ways there is added to the covariance of its center, NaN if there is no other.
     """
     call = "marginal_covariances"
     require(graph, Graph, call, "marginal_covariances(graph, estimate)")
@@ -87,7 +89,18 @@ def marginal_covariances(
     landmarks = estimate.dual_quadrics if is_quadric else estimate.ellipsoids
     mapped = np.isin(graph.object_ids, estimate.object_ids)
     core = graph.core if mapped.all() else only_objects(graph.core, mapped)
-    return _marginals(core, estimate.object_ids, options, _core.State(estimate.poses, landmarks))
+    found = _marginals(core, estimate.object_ids, options, _core.State(estimate.poses, landmarks))
+    return replace(found, objects=with_contradictions(found.objects, estimate))
+
+
+def with_contradictions(objects: Floats, estimate: Estimate) -> Floats:
+    """Return covariances of objects, (o, 9, 9), that are wider for those that are contradicted."""
+    rows = np.flatnonzero(np.isin(estimate.object_ids, list(estimate.contradicted)))
+    wider = objects.copy()
+    for row in rows:
+        ways = np.delete(estimate.centers, row, axis=0) - estimate.centers[row]
+        wider[row, :3, :3] += ways.T @ ways / len(ways) if len(ways) else np.nan
+    return wider
 
 
 def posterior_bound(graph: Graph, truth: Truth) -> Bound:

@@ -29,6 +29,7 @@ from dqslam.pipeline.report import (
     describe_times,
     warn_of_boxes,
     warn_of_calibration,
+    warn_of_contradictions,
     warn_of_evidence,
     warn_of_sizes,
 )
@@ -132,6 +133,7 @@ def conclude(
             *output.remarks,
             *doubts,
             *warn_of_evidence(output.evidence),
+            *warn_of_contradictions(estimate),
             *warn_of_sizes(estimate, output.size_prior),
             *warn_of_calibration(output.calibration),
         ],

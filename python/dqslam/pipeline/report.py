@@ -78,6 +78,11 @@ def warn_of_boxes(count: int, explained: int) -> list[str]:
     ]
 
 
+def warn_of_contradictions(estimate: Estimate) -> list[str]:
+    """Warn of objects that their own boxes contradict."""
+    return [f"object {name} is contradicted: {why}" for name, why in estimate.contradicted.items()]
+
+
 def warn_of_sizes(estimate: Estimate, prior: SizePrior | SizePriors) -> list[str]:
     """Warn of objects with an axis that is far from the sizes that are expected of their class."""
     warnings = []
@@ -156,6 +161,7 @@ def describe_objects(
             "center_m": estimate.centers[row].tolist(),
             "semi_axes_m": _numbers(estimate.semi_axes[row]),
             "center_sigma_m": _number(np.sqrt(np.trace(centers[row]))),
+            "contradicted": estimate.contradicted.get(int(object_id)),
             **describe_boxes(chi2[detections.object_id == object_id]),
         }
         for row, object_id in enumerate(estimate.object_ids)

@@ -59,6 +59,8 @@ class MapObjects:
     """Sigmas of the natural logarithms of the semi-axes, shape (o, 3); NaN if unknown."""
     dropped: Mapping[int, str] = field(default_factory=dict)
     """Reasons why objects are not in the map, by their ids."""
+    contradicted: Mapping[int, str] = field(default_factory=dict)
+    """Reasons why the boxes of mapped objects contradict them, by their ids."""
 
     def __len__(self) -> int:
         """Return the number of objects."""
@@ -230,6 +232,11 @@ def _read_map(path: Path) -> MapObjects:
             center_covariances=_maybe(objects, "center_covariance", (3, 3)),
             log_semi_axes_sigmas=_maybe(objects, "log_semi_axes_sigma", (3,)),
             dropped={int(one["id"]): str(one["reason"]) for one in content.get("dropped", [])},
+            contradicted={
+                int(one["id"]): str(one["contradicted"])
+                for one in content["objects"]
+                if "contradicted" in one
+            },
         )
     except (ValueError, TypeError, KeyError) as error:
         raise FileError(path, str(error)) from None

@@ -124,6 +124,8 @@ def _object(estimate: Estimate, row: int, marginals: Covariances | None) -> dict
         "dual_quadric": _core.dual_quadric_matrix(estimate.dual_quadrics[row]),
         "observations": int(estimate.observations[row]),
     }
+    if int(estimate.object_ids[row]) in estimate.contradicted:
+        described["contradicted"] = estimate.contradicted[int(estimate.object_ids[row])]
     covariance = None if marginals is None else marginals.objects[row]
     if covariance is None or semi_axes is None or not np.isfinite(covariance).all():
         return described

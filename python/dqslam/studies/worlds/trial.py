@@ -44,7 +44,8 @@ class WorldSolve:
     is_optimum: bool | None = None
     """Whether it is not above that cost by more than 0.05; None if that is not known."""
     converged: bool | None = None
-    """What the solver says of itself; None if there was nothing to solve."""
+    """What the result says of itself: whether the solver has converged and no object is left out
+    because its boxes do not fit; None if there was nothing to solve."""
     failure: str = ""
     """Why there is no estimate."""
     score_failure: str = ""
@@ -97,7 +98,7 @@ def _solve(row: RowName, scenario: Scenario, recording: Recording, truth: Truth)
         return WorldSolve(failure=f"{type(error).__name__}: {error}", cpu_seconds=seconds)
     solved = replace(
         _errors(estimate, truth),
-        converged=summary.converged,
+        converged=summary.converged and not estimate.dropped,
         cpu_seconds=time.process_time() - start,
     )
     try:
