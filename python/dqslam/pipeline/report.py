@@ -83,6 +83,19 @@ def warn_of_contradictions(estimate: Estimate) -> list[str]:
     return [f"object {name} is contradicted: {why}" for name, why in estimate.contradicted.items()]
 
 
+def warn_of_bent_poses(marginals: Marginals | None) -> list[str]:
+    """Warn of poses that no Gaussian describes, because their headings are too uncertain."""
+    if marginals is None or not marginals.is_bent.any():
+        return []
+    first = 2 if marginals.poses.shape[1] == 3 else 3
+    variance = np.diagonal(marginals.poses, axis1=1, axis2=2)[:, first:]
+    sigma = np.degrees(np.sqrt(np.nanmax(variance)))
+    return [
+        f"the rotations of {marginals.is_bent.sum()} poses are uncertain by up to {sigma:.1f} deg: "
+        "their covariances are too narrow across the bow that these poses may lie on"
+    ]
+
+
 def warn_of_sizes(estimate: Estimate, prior: SizePrior | SizePriors) -> list[str]:
     """Warn of objects with an axis that is far from the sizes that are expected of their class."""
     warnings = []
