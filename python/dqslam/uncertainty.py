@@ -64,8 +64,8 @@ class Marginals:
     def is_bent(self) -> Bools:
         """Whether no Gaussian describes the error of a pose, shape (n,).
 
-        Its rotation has a sigma of more than 0.1 rad. `pose_errors` then has larger errors across
-        the bow, along which such a pose is spread, than the covariance says.
+        Its rotation has a sigma of more than 0.1 rad. Across the bow along which such a pose is
+        spread, errors are then larger than the covariance says, in `tangent_errors`, too.
         """
         first = 2 if self.poses.shape[1] == 3 else 3
         variance = np.diagonal(self.poses, axis1=1, axis2=2)[:, first:]
@@ -173,7 +173,7 @@ def normalized_squares(errors: Floats, covariances: Floats) -> Floats:
     return np.asarray((errors * whitened).mean(axis=1))
 
 
-def pose_errors(model: _core.PoseModel, true: Floats, estimated: Floats) -> Floats:
+def tangent_errors(model: _core.PoseModel, true: Floats, estimated: Floats) -> Floats:
     """Return the errors of poses in exponential coordinates, for true and estimated (n, d).
 
     They are the logarithm of estimated^-1 true in SE(2) or SE(3), translation [m] before rotation

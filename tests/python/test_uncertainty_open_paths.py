@@ -9,7 +9,8 @@ from scipy.spatial.transform import Rotation
 
 import dqslam as dq
 from dqslam import _core
-from dqslam.uncertainty import Marginals, chi_square_interval, normalized_squares, pose_errors
+from dqslam.io import Trajectory
+from dqslam.uncertainty import Marginals, chi_square_interval, normalized_squares, tangent_errors
 
 DRIVES = 120
 AHEAD = [0.0, 0.0, 0.0, -0.5, 0.5, -0.5, 0.5]
@@ -30,7 +31,7 @@ def in_space(pose):
 def test_on_the_plane_errors_are_the_logarithm_of_matrices():
     random = np.random.default_rng(0)
     true, estimated = random.normal(size=(2, 20, 3))
-    found = pose_errors(dq.PoseModel.SE2, true, estimated)
+    found = tangent_errors(dq.PoseModel.SE2, true, estimated)
     for error, one, other in zip(found, true, estimated, strict=True):
         log = logm(np.linalg.inv(in_plane(other)) @ in_plane(one)).real
         np.testing.assert_allclose(error, [log[0, 2], log[1, 2], log[1, 0]], atol=1e-9)
@@ -48,7 +49,7 @@ def test_in_space_errors_are_those_whose_exponential_is_the_motion(angle):
     estimated = np.array([1.0, -2.0, 0.5, *Rotation.random(random_state=2).as_quat()])
     moved = in_space(estimated) @ expm(generator)
     true = np.concatenate([moved[:3, 3], Rotation.from_matrix(moved[:3, :3]).as_quat()])
-    found = pose_errors(dq.PoseModel.SE3, true[None], estimated[None])[0]
+    found = tangent_errors(dq.PoseModel.SE3, true[None], estimated[None])[0]
     np.testing.assert_allclose(found, vector, atol=1e-8)
 
 
@@ -89,7 +90,7 @@ def nees_of_the_end(yaw):
     true, estimated = (np.array([one[i] for one in ends]) for i in (0, 1))
     covariance = np.array([one[2].poses[-1] for one in ends])
     model = dq.PoseModel.SE2
-    errors = (pose_errors(model, true, estimated), _core.minus(model, true, estimated))
+    errors = (tangent_errors(model, true, estimated), _core.minus(model, true, estimated))
     bent = np.mean([one[2].is_bent[-1] for one in ends])
     return *(normalized_squares(error, covariance).mean() for error in errors), bent
 
@@ -116,3 +117,21 @@ def test_only_rotations_bend():
     assert Marginals(poses, np.zeros((0, 9, 9)), ()).is_bent.tolist() == [False, True]
     poses = np.array([np.diag([9.0] * 3 + [0.0, 0.0, 0.11**2]), np.full((6, 6), np.nan)])
     assert Marginals(poses, np.zeros((0, 9, 9)), ()).is_bent.tolist() == [True, False]
+
+
+def test_evaluation_has_the_nees_of_the_poses_in_files(tmp_path):
+    recording, truth = dq.simulate(dq.load_scenario("paper"), seed=7)
+    graph = dq.build_graph(recording)
+    estimate, _ = dq.solve(graph)
+    marginals = dq.marginal_covariances(graph, estimate)
+    dq.save_estimate(estimate, tmp_path, marginals=marginals)
+    cameras = _core.world_from_camera(truth.pose_model, recording.camera, truth.poses)
+    true = Trajectory(recording.timestamps, cameras)
+    errors = tangent_errors(truth.pose_model, truth.poses, estimate.poses)[1:]
+    expected = normalized_squares(errors, marginals.poses[1:])
+    found = dq.evaluate_results(dq.load_results(tmp_path), true)["nees"]
+    assert found["poses"] == 252
+    assert found["mean"] == pytest.approx(expected.mean(), rel=1e-3)
+    assert found["median"] == pytest.approx(np.median(expected), rel=1e-3)
+    later = Trajectory(true.timestamps[5:], true.world_from_camera[5:])
+    assert dq.evaluate_results(dq.load_results(tmp_path), later)["nees"] is None

@@ -17,8 +17,8 @@ from dqslam.uncertainty import (
     chi_square_interval,
     marginal_covariances,
     normalized_squares,
-    pose_errors,
     posterior_bound,
+    tangent_errors,
     true_state,
 )
 
@@ -74,7 +74,7 @@ def score_bound(
     """
     estimate, _ = solved
     covariance = marginal_covariances(graph, estimate, options)
-    pose_error = pose_errors(truth.pose_model, truth.poses, estimate.poses)[1:]
+    pose_error = tangent_errors(truth.pose_model, truth.poses, estimate.poses)[1:]
     pose_nees = normalized_squares(pose_error, covariance.poses[1:])
     exists = np.isin(estimate.object_ids, truth.object_id)
     rows = true_rows(estimate.object_ids[exists], truth)

@@ -16,7 +16,7 @@ from dqslam.simulation.scenario import Scenario
 from dqslam.simulation.simulator import simulate
 from dqslam.studies.paper.scores import right_graph_of, score_bound
 from dqslam.studies.worlds.rows import RowName, row_assumptions, row_options
-from dqslam.uncertainty import Marginals, normalized_squares, pose_errors
+from dqslam.uncertainty import Marginals, normalized_squares, tangent_errors
 
 LOST_COST = 10.0
 """A solve that ends this far above a solve that starts at the truth is lost."""
@@ -151,7 +151,7 @@ def _nees(estimate: Estimate, marginals: Marginals | None, truth: Truth) -> tupl
         return NAN, NAN
     known = np.flatnonzero(np.isfinite(marginals.poses).all(axis=(1, 2)))
     known = known[known > 0]  # the first pose is fixed
-    error = pose_errors(truth.pose_model, truth.poses[known], estimate.poses[known])
+    error = tangent_errors(truth.pose_model, truth.poses[known], estimate.poses[known])
     exists = np.isin(estimate.object_ids, truth.object_id)
     exists &= np.isfinite(marginals.centers).all(axis=(1, 2))
     rows = true_rows(estimate.object_ids[exists], truth)
