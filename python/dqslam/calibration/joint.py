@@ -19,7 +19,9 @@ from dqslam.graph import Graph, solve
 
 # A calibration has converged when no parameter moves by more than this share of its sigma.
 SMALL_CHANGE = 0.05
-MAX_ROUNDS = 10
+MAX_ROUNDS = 20
+# A step that takes back more than this share of the one before is too long, as are all after it.
+TURNS_BACK = 0.5
 
 
 def solve_with_calibration(
@@ -105,7 +107,7 @@ def solve_jointly(
     """
     names = calibration_parameters()
     total = np.zeros(len(names))
-    calibrated = graph
+    calibrated, last, damping = graph, None, 1.0
     for _ in range(MAX_ROUNDS):
         estimate, summary = solve(calibrated, options, start=start)
         calibrated, graph = mapped_graph(calibrated, estimate), mapped_graph(graph, estimate)
@@ -118,7 +120,11 @@ def solve_jointly(
             raise ValueError(f"calibration: the data do not determine {names[open_rows[0]]}")
         change, covariance = scores.estimate(rows)
         sigma = np.sqrt(np.diag(covariance))
-        total[rows] = combined(total[rows], change, rows)
+        step = change / sigma
+        if last is not None and last @ step < -TURNS_BACK * (last @ last):
+            damping *= 0.5
+        last = step
+        total[rows] = combined(total[rows], damping * change, rows)
         core = recalibrate(graph.core, state, graph.timestamps, total, is_late=is_late)
         calibrated = replace(graph, core=core)
         if start is not None:

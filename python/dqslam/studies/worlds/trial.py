@@ -9,7 +9,7 @@ from dqslam import _core
 from dqslam._checks import Floats
 from dqslam.calibration import calibrated_covariances, solve_with_calibration
 from dqslam.estimate import Estimate
-from dqslam.graph import solve
+from dqslam.graph import ENOUGH_INLIERS, Graph, solve
 from dqslam.metrics import position_error, true_rows
 from dqslam.pipeline import run
 from dqslam.recording import Recording, Truth
@@ -50,8 +50,8 @@ class WorldSolve:
     is_optimum: bool | None = None
     """Whether it is not above that cost by more than 0.05; None if that is not known."""
     converged: bool | None = None
-    """What the result says of itself: whether the solver has converged and no object is left out
-    because its boxes do not fit; None if there was nothing to solve."""
+    """Whether the solver says that it has converged, and no object with six boxes or more is left
+    out because they do not fit; None if there was nothing to solve."""
     failure: str = ""
     """Why there is no estimate."""
     score_failure: str = ""
@@ -115,7 +115,7 @@ def _calibrate(scenario: Scenario, recording: Recording, truth: Truth) -> WorldS
         _errors(estimate, truth),
         pose_nees=pose_nees,
         center_nees=center_nees,
-        converged=summary.converged and not estimate.dropped,
+        converged=summary.converged and not _gives_up(graph, estimate),
         cpu_seconds=time.process_time() - start,
     )
 
@@ -131,7 +131,7 @@ def _solve(row: RowName, scenario: Scenario, recording: Recording, truth: Truth)
         return WorldSolve(failure=f"{type(error).__name__}: {error}", cpu_seconds=seconds)
     solved = replace(
         _errors(estimate, truth),
-        converged=summary.converged and not estimate.dropped,
+        converged=summary.converged and not _gives_up(graph, estimate),
         cpu_seconds=time.process_time() - start,
     )
     try:
@@ -166,6 +166,12 @@ def _run(recording: Recording, truth: Truth) -> WorldSolve:
         converged=None if result.summary is None else result.summary.converged,
         cpu_seconds=seconds,
     )
+
+
+def _gives_up(graph: Graph, estimate: Estimate) -> bool:
+    """Return whether an object is left out that has enough boxes, because they do not fit."""
+    dropped = np.isin(graph.object_ids, list(estimate.dropped))
+    return bool((graph.observations[dropped] >= ENOUGH_INLIERS).any())
 
 
 def _errors(estimate: Estimate, truth: Truth) -> WorldSolve:
