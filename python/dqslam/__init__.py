@@ -50,6 +50,7 @@ if TYPE_CHECKING:  # the one list of public names, a line each: lazy_exports rea
     from dqslam.assumptions import SizePriors as SizePriors
     from dqslam.assumptions import load_size_priors as load_size_priors
     from dqslam.calibration import CalibrationFinding as CalibrationFinding
+    from dqslam.calibration import calibrated_covariances as calibrated_covariances
     from dqslam.calibration import calibration_parameters as calibration_parameters
     from dqslam.calibration import check_calibration as check_calibration
     from dqslam.calibration import solve_with_calibration as solve_with_calibration

@@ -56,6 +56,9 @@ class Estimate:
     """Reasons why objects are not in the map, by id."""
     doubtful: Mapping[int, str] = field(default_factory=dict)
     """Reasons why the size or shape of an object in the map is not to be believed, by id."""
+    contradicted: Mapping[int, str] = field(default_factory=dict)
+    """Mapped objects that their own boxes contradict, with the reason, by id: most of their boxes
+    do not fit, or they are where another object is. Their ids are likely wrong."""
 
     def __repr__(self) -> str:
         """Show the pose model, and how many poses and objects there are."""
@@ -63,6 +66,8 @@ class Estimate:
         parts.append(counted(len(self.object_ids), "object"))
         if self.dropped:
             parts.append(f"{len(self.dropped)} dropped")
+        if self.contradicted:
+            parts.append(f"{len(self.contradicted)} contradicted")
         return f"Estimate({', '.join(parts)})"
 
     @property

@@ -9,6 +9,7 @@ from dqslam import _core
 from dqslam._checks import Bools, Floats, Ints, as_floats, reject_rows, require
 from dqslam._repr import counted
 from dqslam.assumptions import BoxNoise, SizePrior, SizePriors
+from dqslam.coincidence import contradicted_objects
 from dqslam.estimate import Estimate
 from dqslam.lens import Lens, LensCamera, camera_with
 from dqslam.recording import Detections, LoopClosures, Measurements, Odometry, Recording
@@ -22,6 +23,10 @@ FEWEST_INLIER_VIEWS = 3
 # it may be the boxes of a moved object at one of its places.
 ENOUGH_INLIERS = 6
 ENOUGH_INLIER_SHARE = 1.0 / 3.0
+# Where more boxes do not fit, the set of those that do may be another one.
+MANY_MISFITS = 0.05
+# A solution is better if half its chi-square is lower by this.
+LEAST_GAIN = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,8 +140,9 @@ def solve(
     """Estimate poses and objects.
 
     The default loss is robust: boxes that do not fit their object have no weight. Objects that too
-    few of their boxes fit are in `Estimate.dropped`, with the reason, and not in the estimate. With
-    free dual quadrics, objects that are no ellipsoids have NaN in `Estimate.ellipsoids`.
+    few of their boxes fit are in `Estimate.dropped`, with the reason, and not in the estimate, and
+    those that their boxes contradict in `Estimate.contradicted`. With free dual quadrics, objects
+    that are no ellipsoids have NaN in `Estimate.ellipsoids`.
 
     Parameters
     ----------
@@ -166,6 +172,8 @@ def solve(
     options = _core.SolveOptions() if options is None else options
     require(options, _core.SolveOptions, "solve", "SolveOptions(loss=Loss.CAUCHY)")
     solution = _core.solve(graph.core, options, start)
+    if start is None and _may_find_better(options, solution.inliers):
+        solution = _solved_again(graph.core, options, solution)
     initial_poses = graph.core.initial_poses
     dual_quadrics = as_floats("solution.dual_quadrics", solution.dual_quadrics, [None, 9])
     landmarks = as_floats("solution.landmarks", solution.landmarks, [None, 9])
@@ -194,8 +202,36 @@ def solve(
         ),
         inliers=solution.inliers,
         dropped=unfit,
+        contradicted=contradicted_objects(
+            graph.core,
+            _core.State(solution.poses, np.where(kept[:, None], ellipsoids, np.nan)),
+            solution.inliers,
+            graph.object_ids,
+        ),
     )
     return estimate, solution.summary
+
+
+def _may_find_better(options: _core.SolveOptions, inliers: Bools) -> bool:
+    """Return whether another set of boxes may fit better than the one found, from flags (b,)."""
+    graduates = options.loss in (_core.Loss.GNC_TLS, _core.Loss.GNC_GM)
+    return graduates and float(np.mean(~inliers)) > MANY_MISFITS
+
+
+def _solved_again(
+    core: _core.Graph, options: _core.SolveOptions, solution: _core.Solution
+) -> _core.Solution:
+    """Begin the graduated loss again at a solution, and return the better of both.
+
+    It starts from the Cauchy loss of all boxes, those that were given up, too.
+    """
+    again = _core.solve(core, options, _core.State(solution.poses, solution.landmarks))
+    phi = options.outlier_chi_square
+
+    def cost(one: _core.Solution) -> float:
+        return float(one.summary.final_cost + 0.5 * phi * np.sum(~one.inliers))
+
+    return again if cost(again) < cost(solution) - LEAST_GAIN else solution
 
 
 def _unfit(graph: Graph, inliers: Bools) -> dict[int, str]:

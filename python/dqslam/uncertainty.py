@@ -3,13 +3,13 @@
 The first pose is fixed, and everything is relative to it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
 from dqslam import _core
-from dqslam._checks import Floats, Ints, require
+from dqslam._checks import Bools, Floats, Ints, require
 from dqslam._core import LandmarkModel, Loss, Mode, SolveOptions
 from dqslam._repr import counted
 from dqslam.estimate import Estimate
@@ -17,6 +17,10 @@ from dqslam.graph import Graph
 from dqslam.metrics import true_rows
 from dqslam.recording import Truth
 from dqslam.subgraph import only_objects, rebuilt
+
+# Sigma of a rotation, rad, up to which the spread of a pose is a straight one in exponential
+# coordinates: the NEES of the end of a straight drive of 200 m is 1.1 there, 2.0 at twice that.
+LARGEST_TURN = 0.1
 
 
 @dataclass(frozen=True)
@@ -60,6 +64,17 @@ class Marginals:
         )
 
     @property
+    def is_bent(self) -> Bools:
+        """Whether no Gaussian describes the error of a pose, shape (n,).
+
+        Its rotation has a sigma of more than 0.1 rad. Across the bow along which such a pose is
+        spread, errors are then larger than the covariance says, in `tangent_errors`, too.
+        """
+        first = 2 if self.poses.shape[1] == 3 else 3
+        variance = np.diagonal(self.poses, axis1=1, axis2=2)[:, first:]
+        return np.asarray((variance > LARGEST_TURN**2).any(axis=1))
+
+    @property
     def centers(self) -> Floats:
         """Covariances of the objects' centers in the world, m^2, shape (o, 3, 3)."""
         return self.objects[:, :3, :3]
@@ -81,6 +96,8 @@ def marginal_covariances(
     """Return the covariances of an estimate's poses and mapped objects.
 
     The options are those of the solve. With a robust loss, boxes that do not fit are left out.
+    An object in `Estimate.contradicted` may be at the place of any other: the mean of the outer
+    products of the ways there is added to the covariance of its center, NaN if there is no other.
     """
     call = "marginal_covariances"
     require(graph, Graph, call, "marginal_covariances(graph, estimate)")
@@ -93,7 +110,18 @@ def marginal_covariances(
     mapped = np.isin(graph.object_ids, estimate.object_ids)
     core = graph.core if mapped.all() else only_objects(graph.core, mapped)
     state = _core.State(estimate.poses, landmarks, list(estimate.object_shapes))
-    return _marginals(core, estimate.object_ids, options, state)
+    found = _marginals(core, estimate.object_ids, options, state)
+    return replace(found, objects=with_contradictions(found.objects, estimate))
+
+
+def with_contradictions(objects: Floats, estimate: Estimate) -> Floats:
+    """Return covariances of objects, (o, 9, 9), that are wider for those that are contradicted."""
+    rows = np.flatnonzero(np.isin(estimate.object_ids, list(estimate.contradicted)))
+    wider = objects.copy()
+    for row in rows:
+        ways = np.delete(estimate.centers, row, axis=0) - estimate.centers[row]
+        wider[row, :3, :3] += ways.T @ ways / len(ways) if len(ways) else np.nan
+    return wider
 
 
 def posterior_bound(graph: Graph, truth: Truth) -> Bound:
@@ -150,6 +178,31 @@ def normalized_squares(errors: Floats, covariances: Floats) -> Floats:
     """Return the squared errors (n, k) in sigmas of covariances (n, k, k), divided by k; (n,)."""
     whitened = np.linalg.solve(covariances, errors[:, :, None])[:, :, 0]
     return np.asarray((errors * whitened).mean(axis=1))
+
+
+def tangent_errors(model: _core.PoseModel, true: Floats, estimated: Floats) -> Floats:
+    """Return the errors of poses in exponential coordinates, for true and estimated (n, d).
+
+    They are the logarithm of estimated^-1 true in SE(2) or SE(3), translation [m] before rotation
+    [rad], in the frame of each estimated pose: shape (n, k). A pose at the end of a path without
+    loops is spread along a bow, since every error of its rotation has turned the rest of the path.
+    In these coordinates the bow is nearly straight, so that the covariance of the pose, which is
+    the same to first order, describes it.
+    """
+    split = _core.minus(model, true, estimated)
+    if model == _core.PoseModel.SE2:
+        rotation = np.pad(split[:, 2:], ((0, 0), (2, 0)))
+        translation = np.pad(split[:, :2], ((0, 0), (0, 1)))
+    else:
+        translation, rotation = split[:, :3], split[:, 3:]
+    # V^-1 t = t - w x t / 2 + (1 - (a / 2) cot(a / 2)) / a^2 w x (w x t), with a = |w|
+    angle = np.linalg.norm(rotation, axis=1)[:, None]
+    half = 0.5 * np.maximum(angle, 1e-4)
+    factor = np.where(angle < 1e-4, 1.0 / 12.0, (1.0 - half / np.tan(half)) / (4.0 * half**2))
+    once = np.cross(rotation, translation)
+    straight = translation - 0.5 * once + factor * np.cross(rotation, once)
+    size = split.shape[1] // 2 + split.shape[1] % 2
+    return np.hstack([straight[:, :size], split[:, size:]])
 
 
 def chi_square_interval(freedom: int) -> list[float]:

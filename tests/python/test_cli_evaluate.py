@@ -31,6 +31,7 @@ def test_tables_and_file(files, capsys):
         "odometry_ate",
         "rpe",
         "odometry_rpe",
+        "nees",
         "true_from_estimated",
         "objects",
         "reprojection_iou",

@@ -89,9 +89,12 @@ def test_failures_are_shown(small, tmp_path, capsys, monkeypatch):
     [
         (["moon"], "moon: no such scenario; by name there are: honest, honest_orbit, orbit, paper"),
         (["loop", "loop"], "scenarios: expected one or more, of different names"),
-        (["loop", "--row", "magic"], "--row: 'magic' is none of told, default, plain, run"),
+        (
+            ["loop", "--row", "magic"],
+            "--row: 'magic' is none of told, calibrated, default, plain, run",
+        ),
         (["loop", "--row", "told", "--trials", "0"], "--trials"),
-        (["loop_cubes", "--row", "told"], "loop_cubes has no right sigmas"),
+        (["loop_cubes", "--row", "told"], "loop_cubes has nothing for told: no right sigmas"),
         (["loop", "--page", "no/such/page.md"], "page.md"),
     ],
 )

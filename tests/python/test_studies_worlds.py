@@ -22,6 +22,7 @@ from dqslam.studies.worlds import (
     save_results,
     summarize,
     usual_rows,
+    wrong_parameters,
 )
 from dqslam.studies.worlds import trial as trial_module
 from dqslam.uncertainty import true_state
@@ -70,6 +71,8 @@ def of(*solves):
         ("bursts_20", ("told", "default")),
         ("swapped_20", ("told", "default")),
         ("missing_50", ("told", "default")),
+        ("focal_2", ("told", "calibrated", "default")),
+        ("scale_3", ("told", "calibrated", "default")),
     ],
 )
 def test_the_rows_that_make_sense(world, rows):
@@ -256,6 +259,19 @@ def test_the_pipeline_is_a_row_too():
     assert not one.is_lost
     assert one.mapped >= 3
     assert np.isfinite([one.pose_nees, one.center_nees]).all()
+
+
+def test_what_is_wrong_with_the_calibration_is_estimated_in_a_row_of_its_own():
+    scenario = load_scenario("mount_yaw_2")
+    assert wrong_parameters(scenario) == ("mount_yaw",)
+    assert wrong_parameters(load_scenario("loop")) == ()
+    trial = run_trial(scenario, 1000, ("told", "calibrated"))
+    told, calibrated = trial.rows["told"], trial.rows["calibrated"]
+    assert calibrated.failure == ""
+    assert told.pose_nees > 100.0
+    assert calibrated.pose_nees < 3.0
+    assert calibrated.position_error < 0.5 * told.position_error
+    assert calibrated.is_optimum is None
 
 
 def test_errors_are_kept_with_what_was_found_before(monkeypatch):

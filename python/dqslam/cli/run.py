@@ -58,6 +58,14 @@ def run(
         Literal["slam", "mapping"],
         typer.Option(help="slam estimates the path too; mapping keeps the odometry."),
     ] = "slam",
+    estimate: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAMES",
+            help="Parameters of the calibration to estimate, too, with commas between: mount, "
+            "mount_position, focal, principal_point, k1, odometry_scale, gyro_bias, time_offset.",
+        ),
+    ] = None,
     perturb_odometry: Annotated[
         str | None,
         typer.Option(
@@ -165,6 +173,7 @@ def run(
         trust_ids=trust_ids,
         mode=_core.Mode[mode.upper()],
         size_prior=None if size_priors is None else load_size_priors(size_priors),
+        estimate=split_names(estimate),
         hold_out=hold_out,
         seed=seed,
         min_score=min_score,
@@ -206,6 +215,11 @@ def run(
         output.line(f"wrote {mcap}")
     if result.report["doubts"]:
         raise typer.Exit(DOUBTFUL)
+
+
+def split_names(text: str | None) -> tuple[str, ...]:
+    """Split text like "mount, focal"; None gives no names."""
+    return () if text is None else tuple(name.strip() for name in text.split(","))
 
 
 def parse_noise(option: str, text: str | None) -> "OdometryNoise | None":

@@ -60,6 +60,8 @@ def _overview(report: dict[str, Any]) -> "Table":
     table.add_row("re-projection", _reprojection(report["reprojection"]))
     table.add_row("noise of a box edge", _box_noise(report["box_noise"]))
     table.add_row("odometry noise", _noise(report["odometry_noise"]))
+    if report["estimated_calibration"]:
+        table.add_row("estimated calibration", _calibration(report["estimated_calibration"]))
     if report["evidence"] is not None:
         table.add_row("boxes held out", _evidence(report["evidence"]))
     error = report["trajectory_error"]
@@ -92,6 +94,13 @@ def _box_noise(noise: dict[str, Any]) -> str:
     return (
         f"{part(noise['new'])}, new in each image; {part(noise['repeated'])}, "
         "the same from the same side"
+    )
+
+
+def _calibration(estimated: dict[str, dict[str, Any]]) -> str:
+    return "\n".join(
+        f"{name} {one['value']:.4g} ± {one['sigma']:.2g} {one['unit']}".rstrip()
+        for name, one in estimated.items()
     )
 
 

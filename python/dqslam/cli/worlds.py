@@ -31,8 +31,8 @@ def worlds(
         list[str] | None,
         typer.Option(
             metavar="ROW",
-            help="told, default, plain or run; can be repeated. Default: told where there are "
-            "right sigmas, and default.",
+            help="told, calibrated, default, plain or run; can be repeated. Default: told where "
+            "there are right sigmas, calibrated where a calibration is wrong, and default.",
         ),
     ] = None,
     page: Annotated[

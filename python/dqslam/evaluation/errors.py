@@ -7,9 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from dqslam._checks import Floats
+from dqslam._core import PoseModel
 from dqslam.evaluation.trajectory import common_poses
 from dqslam.io import Results, Trajectory
 from dqslam.metrics import Align, Alignment, align_positions
+from dqslam.uncertainty import tangent_errors
+
+# Eigenvalues of correlations, below which a direction is one that a pose does not have. Files have
+# nine digits.
+RANK_TOLERANCE = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +74,48 @@ def pose_errors(
         rotation=(turn * Rotation.from_quat(true_poses[:, 3:]).inv()).as_rotvec(),
         rotation_sigma=_sigmas(in_world, covariance[:, 3:, 3:]),
     )
+
+
+def pose_nees(
+    results: Results,
+    groundtruth: Trajectory,
+    *,
+    align: Align = "se3",
+    max_time_difference: float | None = None,
+) -> dict[str, float | int] | None:
+    """Return mean and median of the squared errors of poses in sigmas, per degree of freedom.
+
+    Errors are in exponential coordinates and relative to the first pose, as the covariances are:
+    the logarithm of the motion in SE(3) from an estimated pose to the true one. On the plane, and
+    where else a covariance has no rank in a direction, the error in that direction does not count.
+    None where the first pose has no true one, or no other pose has both a true one and a
+    covariance.
+    """
+    rows, true_rows = common_poses(results.timestamps, groundtruth, max_time_difference)
+    if rows[0] != 0:
+        return None
+    known = np.isfinite(results.covariances[rows]).all(axis=(1, 2))
+    known &= rows > 0
+    if not known.any():
+        return None
+    poses, true_poses = results.poses[rows], groundtruth.world_from_camera[true_rows]
+    moved = _same_start(poses, true_poses, "none" if align == "none" else "se3").apply_poses(poses)
+    errors = tangent_errors(PoseModel.SE3, true_poses[known], moved[known])
+    covariance = results.covariances[rows][known]
+    variance = np.diagonal(covariance, axis1=1, axis2=2).reshape(-1, 2, 3)
+    has_any = variance > RANK_TOLERANCE**2 * variance.max(axis=2, keepdims=True)
+    unit = np.where(has_any, np.sqrt(variance.clip(min=0.0)), np.inf).reshape(-1, 6)
+    correlation = covariance / (unit[:, :, None] * unit[:, None, :])
+    values, vectors = np.linalg.eigh(correlation)
+    has_rank = values > RANK_TOLERANCE
+    along = np.einsum("nij,ni->nj", vectors, errors / unit)
+    squares = np.where(has_rank, along**2 / np.where(has_rank, values, 1.0), 0.0).sum(axis=1)
+    nees = squares / has_rank.sum(axis=1)
+    return {
+        "poses": int(known.sum()),
+        "mean": float(nees.mean()),
+        "median": float(np.median(nees)),
+    }
 
 
 def _same_start(poses: Floats, true_poses: Floats, align: Align) -> Alignment:

@@ -8,6 +8,7 @@ import numpy as np
 
 from dqslam._checks import Floats
 from dqslam.evaluation.boxes import evaluate_association, evaluate_reprojection
+from dqslam.evaluation.errors import pose_nees
 from dqslam.evaluation.objects import Match, evaluate_objects
 from dqslam.evaluation.trajectory import common_poses, evaluate_trajectory
 from dqslam.io import Results, Trajectory, TrueBoxes, TrueObjects
@@ -77,6 +78,9 @@ def evaluate_results(
         "odometry_ate": odometry_ate,
         "rpe": rpe,
         "odometry_rpe": odometry_rpe,
+        "nees": pose_nees(
+            results, groundtruth, align=align, max_time_difference=max_time_difference
+        ),
         "true_from_estimated": {
             "by": by,
             "rotation_xyzw": Rotation.from_matrix(alignment.rotation).as_quat(),

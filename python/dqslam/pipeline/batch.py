@@ -24,7 +24,12 @@ from dqslam.pipeline.lens import with_exact_boxes
 from dqslam.pipeline.options import Progress, RunOptions
 from dqslam.pipeline.report import describe_evidence
 from dqslam.recording import Recording
-from dqslam.uncertainty import Marginals, UnderConstrained, marginal_covariances
+from dqslam.uncertainty import (
+    Marginals,
+    UnderConstrained,
+    marginal_covariances,
+    with_contradictions,
+)
 
 # Boxes are undistorted again for the map until they move by less than this [px], or so many times.
 _LENS_PX = 0.02
@@ -118,6 +123,11 @@ def _finish(
         observations=np.array([boxes[name] for name in ids[order]], dtype=np.int64),
         dual_quadrics=solved.dual_quadrics[order],
         ellipsoids=solved.ellipsoids[order],
+        contradicted={
+            int(found.ids[row]): why
+            for row, why in solved.contradicted.items()
+            if found.ids[row] in ids[order]
+        },
     )
     poses = np.full((len(path), *marginals.poses.shape[1:]), np.nan)
     poses[found.keyframes] = marginals.poses
@@ -141,7 +151,9 @@ def _finish(
         )
         poses[:] = np.nan
         poses[final.images] = final.pose_covariance
-        marginals = replace(marginals, poses=poses, objects=final.object_covariance)
+        marginals = replace(
+            marginals, poses=poses, objects=with_contradictions(final.object_covariance, estimate)
+        )
     findings: tuple[CalibrationFinding, ...] = ()
     if solver.mode == _core.Mode.SLAM:
         # Where an object reaches the camera, a box next to the estimate's is undefined: no test.

@@ -23,12 +23,15 @@ from dqslam.pipeline.report import (
     box_chi2,
     describe_box_noise,
     describe_boxes,
+    describe_calibration,
     describe_objects,
     describe_size_prior,
     describe_solver,
     describe_times,
+    warn_of_bent_poses,
     warn_of_boxes,
     warn_of_calibration,
+    warn_of_contradictions,
     warn_of_doubtful,
     warn_of_evidence,
 )
@@ -67,9 +70,11 @@ class EstimatorOutput:
     remarks: tuple[str, ...] = ()
     """What was noticed on the way, a sentence each."""
     calibration: tuple[CalibrationFinding, ...] = ()
-    """What the boxes say about camera, mount and odometry."""
+    """What the boxes say about camera, mount and odometry, which were taken for known."""
     hidden: Bools | None = None
     """Edges of each box that a nearer object may hide, shape (m, 4); None where not looked for."""
+    estimated: tuple[CalibrationFinding, ...] = ()
+    """What was estimated of them, and used."""
     live_poses: Floats | None = None
     """Of a session, before its last polish: world_from_robot, shape (n, d)."""
     step_ms: Floats | None = None
@@ -139,6 +144,8 @@ def conclude(
             *doubts,
             *warn_of_evidence(output.evidence),
             *warn_of_doubtful(estimate),
+            *warn_of_contradictions(estimate),
+            *warn_of_bent_poses(output.marginals),
             *warn_of_calibration(output.calibration),
         ],
         "doubts": doubts,
@@ -160,6 +167,7 @@ def conclude(
         if noise is None
         else {"from": "estimated"} | asdict(noise) | {"levels": output.noise_levels},
         "calibration": [asdict(finding) for finding in output.calibration],
+        "estimated_calibration": describe_calibration(output.estimated),
         "under_constrained": [str(part) for part in output.marginals.under_constrained]
         if output.marginals
         else [],

@@ -9,10 +9,10 @@ import numpy as np
 from dqslam import _core
 from dqslam.absolute import solve_with_absolute_positions
 from dqslam.association import FINAL
-from dqslam.graph import build_graph, solve
+from dqslam.graph import solve
 from dqslam.pipeline.conclude import EstimatorOutput
-from dqslam.pipeline.lens import detections_with_exact_boxes
 from dqslam.pipeline.options import RunOptions
+from dqslam.pipeline.problem import problem_of
 from dqslam.recording import Recording
 from dqslam.uncertainty import marginal_covariances
 
@@ -55,33 +55,7 @@ def with_measurements(
     solver = options.solve_options()
     solver.schedule = _core.Schedule.BATCH
     estimate = output.estimate
-    shown = np.isin(output.object_id, estimate.object_ids[estimate.is_ellipsoid])
-    boxes = replace(recording.detections, object_id=output.object_id).select(shown)
-    boxes = detections_with_exact_boxes(
-        estimate.camera,
-        estimate.pose_model,
-        estimate.poses,
-        estimate.object_ids,
-        estimate.ellipsoids,
-        boxes,
-    )
-    positions, odometry = recording.positions, recording.odometry
-    if positions is not None:
-        positions = positions.select(np.isin(positions.object_id, boxes.object_id))
-    if output.odometry_noise is not None:
-        steps = output.odometry_noise.covariance(len(odometry.relative), odometry.pose_model)
-        odometry = replace(odometry, covariance=steps)
-    told = replace(
-        recording,
-        odometry=odometry,
-        detections=boxes,
-        positions=positions,
-        measurements=(),
-        absolute=None,
-    )
-    graph = build_graph(told, box_noise=output.box_noise, size_prior=output.size_prior)
-    rows = np.searchsorted(estimate.object_ids, graph.object_ids)
-    start = _core.State(estimate.poses, estimate.ellipsoids[rows])
+    graph, start = problem_of(output, recording)
     found, summary = solve(graph, solver, start=start)
     if recording.absolute is not None:
         found, marginals, summary = solve_with_absolute_positions(

@@ -32,6 +32,9 @@ class RunOptions:
     """How large objects are, all of them or by class; None learns one size from those found."""
     estimates_noise: bool = False
     """Whether the level of the odometry's noise is estimated instead of believed."""
+    estimate: tuple[str, ...] = ()
+    """Parameters of the calibration to estimate with all else, as ``solve_with_calibration`` names
+    them: "mount", "focal", "odometry_scale", "gyro_bias", "time_offset", ..."""
     hold_out: float = 0.0
     """Share of the boxes, at least 0 and below 1, that the map is tested on instead."""
     seed: int = 0

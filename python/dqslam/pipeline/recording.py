@@ -11,8 +11,10 @@ from dqslam.association import FINAL, UNSURE
 from dqslam.assumptions import SizePriors
 from dqslam.evaluation import common_poses
 from dqslam.io import Trajectory
+from dqslam.lens import camera_with, lens_of
 from dqslam.pipeline.batch import estimate_batch
 from dqslam.pipeline.border import with_cut_edges
+from dqslam.pipeline.calibrated import check_estimated, estimate_calibrated
 from dqslam.pipeline.conclude import RunResult, conclude
 from dqslam.pipeline.hold_out import choose_held_out
 from dqslam.pipeline.lens import widened
@@ -38,6 +40,7 @@ def run(
     Positions of objects, absolute positions and loop closures take part in a last estimate of all
     poses and objects, whose boxes are known by then. With absolute positions, the result is in
     their frame. Positions need final ids; measurements of other kinds take no part.
+    With ``options.estimate``, camera, mount, clock or odometry are estimated with all else.
 
     Parameters
     ----------
@@ -57,8 +60,9 @@ def run(
     Raises
     ------
     ValueError
-        For ``online`` in mode MAPPING, an option out of range, final ids that a box lacks, size
-        priors of a class that is not in the recording, or a reference of another time.
+        For ``online`` in mode MAPPING, an option out of range, an unknown parameter of the
+        calibration, final ids that a box lacks, size priors of a class that is not in the
+        recording, or a reference of another time.
 
     Examples
     --------
@@ -76,6 +80,7 @@ def run(
     if reference is not None:  # before the work: may they be compared?
         common_poses(recording.timestamps, reference)
     recording = with_cut_edges(recording)
+    check_estimated(recording, options)
     camera = recording.camera
     recording, offset = widened(recording)
     boxes = recording.detections
@@ -88,14 +93,28 @@ def run(
         remarks = ("there is no box: the trajectory is the odometry", *remarks)
     held_out = choose_held_out(len(boxes), options.hold_out, seed=options.seed)
     known = replace(recording, detections=boxes.select(~held_out))
-    bare = replace(known, positions=None, measurements=(), absolute=None, closures=None)
-    output = (estimate_online if online else estimate_batch)(bare, options, progress)
-    output = with_measurements(output, known, options)
+    estimator = estimate_online if online else estimate_batch
+    if options.estimate:
+        output, calibrated = estimate_calibrated(known, options, estimator, progress)
+        mount = calibrated.camera.robot_from_camera
+        camera = (
+            camera_with(camera, lens_of(camera), robot_from_camera=mount)
+            if camera.has_distortion
+            else calibrated.camera
+        )
+    else:
+        bare = replace(known, positions=None, measurements=(), absolute=None, closures=None)
+        calibrated = known
+        output = with_measurements(estimator(bare, options, progress), known, options)
     output = replace(output, remarks=(*output.remarks, *remarks))
-    result = conclude(output, boxes, held_out, options, reference)
+    # Boxes are judged as the calibration corrects them, and returned as they were given.
+    shift = np.zeros((len(boxes), 4))
+    shift[~held_out] = calibrated.detections.box - known.detections.box
+    corrected = replace(boxes, box=boxes.box + shift)
+    result = conclude(output, corrected, held_out, options, reference)
     shown = result.detections
     return replace(
         result,
         estimate=replace(result.estimate, camera=camera),
-        detections=replace(shown, box=shown.box - np.tile(offset, 2)),
+        detections=replace(shown, box=shown.box - shift - np.tile(offset, 2)),
     )

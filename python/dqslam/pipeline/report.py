@@ -81,9 +81,34 @@ def warn_of_doubtful(estimate: Estimate) -> list[str]:
     return [f"object {one} ({name_of[one]}): {why}" for one, why in estimate.doubtful.items()]
 
 
+def warn_of_contradictions(estimate: Estimate) -> list[str]:
+    """Warn of objects that their own boxes contradict."""
+    return [f"object {name} is contradicted: {why}" for name, why in estimate.contradicted.items()]
+
+
+def warn_of_bent_poses(marginals: Marginals | None) -> list[str]:
+    """Warn of poses that no Gaussian describes, because their headings are too uncertain."""
+    if marginals is None or not marginals.is_bent.any():
+        return []
+    first = 2 if marginals.poses.shape[1] == 3 else 3
+    variance = np.diagonal(marginals.poses, axis1=1, axis2=2)[:, first:]
+    sigma = np.degrees(np.sqrt(np.nanmax(variance)))
+    return [
+        f"the rotations of {marginals.is_bent.sum()} poses are uncertain by up to {sigma:.1f} deg: "
+        "their covariances are too narrow across the bow that these poses may lie on"
+    ]
+
+
 def warn_of_calibration(findings: tuple[CalibrationFinding, ...]) -> list[str]:
     """Warn of deviations from the calibration that even repeated errors of boxes do not explain."""
     return [str(finding) for finding in findings if finding.sigmas > SURE_OF_CALIBRATION]
+
+
+def describe_calibration(estimated: tuple[CalibrationFinding, ...]) -> dict[str, Any]:
+    """Describe what was estimated of the calibration, by the names of its parameters."""
+    return {
+        one.name: {"value": one.value, "sigma": one.sigma, "unit": one.unit} for one in estimated
+    }
 
 
 def describe_box_noise(noise: BoxNoise, repeated: RepeatedNoise | None) -> dict[str, Any]:
@@ -137,6 +162,7 @@ def describe_objects(
             "semi_axes_m": _numbers(estimate.semi_axes[row]),
             "center_sigma_m": _number(np.sqrt(np.trace(centers[row]))),
             "doubt": estimate.doubtful.get(int(object_id)),
+            "contradicted": estimate.contradicted.get(int(object_id)),
             **describe_boxes(chi2[detections.object_id == object_id]),
         }
         for row, object_id in enumerate(estimate.object_ids)

@@ -1,6 +1,6 @@
 """The motion of a robot from pose to pose, as it was measured."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
@@ -79,3 +79,37 @@ class Odometry:
     def __repr__(self) -> str:
         """Show the pose model and how many steps there are."""
         return f"Odometry({self.pose_model.name}, {counted(len(self.relative), 'step')})"
+
+    def with_scale_drift(self, sigma: float, length_m: float) -> Self:
+        """Return the odometry with a covariance that allows for a scale that drifts slowly.
+
+        The scale wanders about its mean with a standard deviation of ``sigma``, a share, and is
+        forgotten over ``length_m`` meters of the path. Over longer distances d, the error along the
+        path then grows like that of independent steps with a variance of 2 sigma^2 length_m d, and
+        each step gets its part of it, in the direction of its motion.
+
+        Raises
+        ------
+        ValueError
+            If ``sigma`` is negative, or ``length_m`` is not positive.
+
+        Examples
+        --------
+        >>> import dqslam as dq
+        >>> recording, truth = dq.simulate(dq.load_scenario("paper"), seed=7)
+        >>> odometry = recording.odometry.with_scale_drift(0.05, length_m=20.0)
+        >>> float(round(odometry.covariance[0, 0, 0] - recording.odometry.covariance[0, 0, 0], 4))
+        0.05
+        """
+        if not sigma >= 0.0:
+            raise ValueError(f"scale drift: sigma is {sigma:g}, negative")
+        if not length_m > 0.0:
+            raise ValueError(f"scale drift: length is {length_m:g} m, not positive")
+        # The covariance is in the frame of the next pose: the translation is turned into it.
+        size = 2 if self.pose_model == _core.PoseModel.SE2 else 3
+        back = _core.inverse(self.pose_model, self.relative)[:, :size]
+        length = np.linalg.norm(back, axis=1)[:, None]
+        along = np.divide(back, length, out=np.zeros_like(back), where=length > 0.0)
+        added = np.zeros_like(self.covariance)
+        added[:, :size, :size] = along[:, :, None] * along[:, None, :] * length[:, :, None]
+        return replace(self, covariance=self.covariance + 2.0 * sigma**2 * length_m * added)

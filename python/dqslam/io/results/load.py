@@ -61,6 +61,8 @@ class MapObjects:
     """Reasons why objects are not in the map, by their ids."""
     doubtful: Mapping[int, str] = field(default_factory=dict)
     """Reasons why the size or shape of an object is not to be believed, by their ids."""
+    contradicted: Mapping[int, str] = field(default_factory=dict)
+    """Reasons why the boxes of mapped objects contradict them, by their ids."""
 
     def __len__(self) -> int:
         """Return the number of objects."""
@@ -235,6 +237,11 @@ def read_map(path: str | Path) -> MapObjects:
             log_semi_axes_sigmas=_maybe(objects, "log_semi_axes_sigma", (3,)),
             dropped={int(one["id"]): str(one["reason"]) for one in content.get("dropped", [])},
             doubtful={int(one["id"]): str(one["doubt"]) for one in objects if one.get("doubt")},
+            contradicted={
+                int(one["id"]): str(one["contradicted"])
+                for one in content["objects"]
+                if "contradicted" in one
+            },
         )
     except (ValueError, TypeError, KeyError) as error:
         raise FileError(path, str(error)) from None

@@ -127,6 +127,8 @@ def _object(estimate: Estimate, row: int, marginals: Covariances | None) -> dict
     doubt = estimate.doubtful.get(int(estimate.object_ids[row]))
     if doubt is not None:
         described["doubt"] = doubt
+    if int(estimate.object_ids[row]) in estimate.contradicted:
+        described["contradicted"] = estimate.contradicted[int(estimate.object_ids[row])]
     covariance = None if marginals is None else marginals.objects[row]
     if covariance is None or semi_axes is None or not np.isfinite(covariance).all():
         return described

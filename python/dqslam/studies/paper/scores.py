@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from dqslam import _core
 from dqslam._checks import Bools
 from dqslam._core import Loss, SolveOptions, Summary
 from dqslam.estimate import Estimate
@@ -19,6 +18,7 @@ from dqslam.uncertainty import (
     marginal_covariances,
     normalized_squares,
     posterior_bound,
+    tangent_errors,
     true_state,
 )
 
@@ -74,7 +74,7 @@ def score_bound(
     """
     estimate, _ = solved
     covariance = marginal_covariances(graph, estimate, options)
-    pose_error = _core.minus(truth.pose_model, truth.poses, estimate.poses)[1:]
+    pose_error = tangent_errors(truth.pose_model, truth.poses, estimate.poses)[1:]
     pose_nees = normalized_squares(pose_error, covariance.poses[1:])
     exists = np.isin(estimate.object_ids, truth.object_id)
     rows = true_rows(estimate.object_ids[exists], truth)

@@ -6,6 +6,7 @@ from dqslam.studies.worlds.rows import ROWS as ROWS
 from dqslam.studies.worlds.rows import RowName as RowName
 from dqslam.studies.worlds.rows import possible_rows as possible_rows
 from dqslam.studies.worlds.rows import usual_rows as usual_rows
+from dqslam.studies.worlds.rows import wrong_parameters as wrong_parameters
 from dqslam.studies.worlds.run import run_worlds as run_worlds
 from dqslam.studies.worlds.summary import RowSummary as RowSummary
 from dqslam.studies.worlds.summary import WorldsSummary as WorldsSummary

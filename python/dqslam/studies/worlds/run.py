@@ -61,7 +61,10 @@ def _rows(scenario: Scenario, asked: tuple[RowName, ...] | None) -> tuple[RowNam
         return usual_rows(scenario)
     rows = tuple(row for row in possible_rows(scenario) if row in asked)
     if not rows:
-        raise ValueError(f"rows: {scenario.name} has no right sigmas that could be told")
+        raise ValueError(
+            f"rows: {scenario.name} has nothing for {' or '.join(asked)}: no right sigmas that "
+            "could be told, or no wrong calibration"
+        )
     return rows
 
 

@@ -1,0 +1,79 @@
+"""Objects that their own boxes contradict.
+
+Ids that are switched give an object the boxes of another one. If most of its boxes are such, it is
+mapped where the other one is, fits these boxes, and looks certain.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dqslam import _core
+from dqslam._checks import Bools, Floats, Ints
+
+# An object is contradicted where more than this share of its boxes does not fit.
+MOST_MISFITS = 0.5
+# Two objects are at one place where this share of the boxes that fit the one would fit the other.
+SAME_PLACE_SHARE = 0.5
+
+
+def contradicted_objects(
+    core: _core.Graph, state: _core.State, inliers: Bools, object_ids: Ints
+) -> dict[int, str]:
+    """Return the objects that their boxes contradict, with the reason, by id.
+
+    Of two objects at one place, it is the one that fewer boxes fit.
+
+    Parameters
+    ----------
+    core, state
+        A problem, and its estimate with ellipsoids, NaN for an object that takes no part.
+    inliers
+        Whether each box fits its object, shape (b,).
+    object_ids
+        Shape (o,).
+    """
+    real = np.isfinite(state.landmarks).all(axis=1)
+    count = np.bincount(core.boxes.object, minlength=len(object_ids))
+    fit = np.bincount(core.boxes.object[inliers], minlength=len(object_ids))
+    reasons = {}
+    for row in np.flatnonzero(real & (count > 0)).tolist():
+        misfits = count[row] - fit[row]
+        if misfits > MOST_MISFITS * count[row]:
+            reasons[int(object_ids[row])] = f"{misfits} of {count[row]} boxes do not fit"
+            continue
+        rivals = real & _near(state.landmarks, row) & (fit >= fit[row])
+        for other in np.flatnonzero(rivals).tolist():
+            if other == row or (fit[other] == fit[row] and other > row):
+                continue
+            boxes = np.flatnonzero(inliers & (core.boxes.object == row))
+            if np.mean(_fits(core, state, boxes, other)) >= SAME_PLACE_SHARE:
+                reasons[int(object_ids[row])] = (
+                    f"it is where object {object_ids[other]} is, which fits its boxes as well"
+                )
+                break
+    return reasons
+
+
+def _near(ellipsoids: Floats, row: int) -> Bools:
+    """Return which objects are nearer to one than the longest semi-axis of either, shape (o,)."""
+    reach = np.full(len(ellipsoids), np.nan)
+    for each in np.flatnonzero(np.isfinite(ellipsoids).all(axis=1)):
+        reach[each] = _core.axes_from_ellipsoid(ellipsoids[each])[1].max()
+    distance = np.linalg.norm(ellipsoids[:, :3] - ellipsoids[row, :3], axis=1)
+    return np.asarray(distance < np.fmax(reach, reach[row]))
+
+
+def _fits(core: _core.Graph, state: _core.State, boxes: Ints, row: int) -> Bools:
+    """Return whether boxes, given by rows (b,), would fit an object."""
+    table = core.boxes
+    chi2 = _core.box_chi_squares(
+        core.pose_model,
+        core.camera,
+        state.poses[table.pose[boxes]],
+        np.tile(state.landmarks[row], (len(boxes), 1)),
+        table.box[boxes],
+        table.covariance[boxes],
+        table.truncated[boxes],
+    )
+    return np.asarray(chi2 <= _core.SolveOptions().outlier_chi_square)
