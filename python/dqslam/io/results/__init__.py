@@ -17,4 +17,5 @@ from dqslam.io.results.load import MapObjects as MapObjects
 from dqslam.io.results.load import Results as Results
 from dqslam.io.results.load import load_map_results as load_map_results
 from dqslam.io.results.load import load_results as load_results
+from dqslam.io.results.map_covariances import ellipsoid_covariances as ellipsoid_covariances
 from dqslam.io.results.save import save_estimate as save_estimate

@@ -1,0 +1,65 @@
+"""What cameras at given poses should see of the objects of a map."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dqslam import _core
+from dqslam._checks import Bools, Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Views:
+    """Each object of a map from each pose."""
+
+    box: Floats
+    """Predicted box, undistorted pixels, shape (n, o, 4); NaN unless the object is in front."""
+    in_image: Floats
+    """Share of the box that is inside the image, shape (n, o); 0 behind the camera."""
+    covered: Floats
+    """Largest share of that part that the box of one nearer object covers, shape (n, o)."""
+    size: Floats
+    """Square root of the area of that part, pixels, shape (n, o)."""
+    distance: Floats
+    """From the camera to the center, meters, shape (n, o)."""
+
+
+def view_objects(camera: _core.Camera, poses: Floats, ellipsoids: Floats) -> Views:
+    """Predict the boxes of ellipsoids at poses (n, 7), world_from_camera.
+
+    The ellipsoids are the same for each pose, shape (o, 9), or its own, shape (n, o, 9). The camera
+    must have no mount.
+    """
+    ellipsoids = np.broadcast_to(ellipsoids, (len(poses), *ellipsoids.shape[-2:]))
+    n, o = ellipsoids.shape[:2]
+    box, _ = _core.project_to_boxes(
+        _core.PoseModel.SE3, camera, np.repeat(poses, o, axis=0), ellipsoids.reshape(-1, 9)
+    )
+    box = box.reshape(n, o, 4)
+    last = np.array([camera.width - 0.5, camera.height - 0.5])
+    cut = np.concatenate(
+        [np.clip(box[..., :2], -0.5, last), np.clip(box[..., 2:], -0.5, last)], axis=-1
+    )
+    side = np.nan_to_num(cut[..., 2:] - cut[..., :2])
+    area = side.prod(axis=-1)
+    whole = (box[..., 2:] - box[..., :2]).prod(axis=-1)
+    in_image = np.where(area > 0.0, area / np.where(whole > 0.0, whole, 1.0), 0.0)
+    apart = ellipsoids[..., :3] - poses[:, None, :3]
+    distance = np.sqrt((apart**2).sum(axis=-1))
+    return Views(box, in_image, _covered(cut, area, distance), np.sqrt(area), distance)
+
+
+def _covered(cut: Floats, area: Floats, distance: Floats) -> Floats:
+    """Return the largest share of each box that one box of a nearer object covers, (n, o)."""
+    shares = np.zeros(area.shape)
+    for image in range(len(cut)):
+        rows = np.flatnonzero(area[image] > 0.0)
+        box = cut[image, rows]
+        low = np.maximum(box[:, None, :2], box[None, :, :2])
+        high = np.minimum(box[:, None, 2:], box[None, :, 2:])
+        common = np.maximum(high - low, 0.0).prod(axis=-1) / area[image, rows, None]
+        nearer: Bools = distance[image, rows][None, :] < distance[image, rows][:, None]
+        shares[image, rows] = np.where(nearer, common, 0.0).max(axis=1, initial=0.0)
+    return shares
