@@ -78,6 +78,10 @@ if TYPE_CHECKING:  # the one list of public names, a line each: lazy_exports rea
     from dqslam.pipeline import RunResult as RunResult
     from dqslam.pipeline import run as run
     from dqslam.pipeline import run_files as run_files
+    from dqslam.places.locate import Candidate as Candidate
+    from dqslam.places.locate import Location as Location
+    from dqslam.places.locate import locate as locate
+    from dqslam.places.locate_map import PlaceMap as PlaceMap
     from dqslam.plot import plot_maps as plot_maps
     from dqslam.recording import AbsolutePositions as AbsolutePositions
     from dqslam.recording import Detections as Detections

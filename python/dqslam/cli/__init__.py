@@ -22,6 +22,7 @@ from dqslam.cli.degeneracy import degeneracy
 from dqslam.cli.demo import demo
 from dqslam.cli.evaluate import evaluate
 from dqslam.cli.inspect import inspect
+from dqslam.cli.locate import locate
 from dqslam.cli.paper import paper
 from dqslam.cli.plot import plot
 from dqslam.cli.run import run
@@ -34,6 +35,7 @@ from dqslam.cli.worlds import worlds
 COMMANDS: dict[str, tuple[Callable[..., None], ...]] = {
     "Start here": (demo, paper, simulate),
     "Your recording": (inspect, convert, run, evaluate),
+    "Places": (locate,),
     "Look": (plot, view),
     "Study": (sweep, worlds, ablation, degeneracy),
 }

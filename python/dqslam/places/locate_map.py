@@ -108,6 +108,11 @@ class ImageBoxes:
     """Logarithm of the probability of each box's labels if it shows an object, shape (b, o)."""
     log_false: Floats
     """Logarithm of the density of each box if it shows none, with its rate, shape (b,)."""
+    log_elsewhere: float
+    """Log-odds of an image of another place against one that shows none of the objects here.
+
+    In another place there are objects, too: as many boxes as usual, not as many as are false.
+    """
 
     @classmethod
     def of(
@@ -130,14 +135,15 @@ class ImageBoxes:
         unknown = sensor.log_label.min(axis=1, keepdims=True)
         table = np.exp(np.hstack([sensor.log_label, unknown]))
         cut = truncated | cut_edges(camera, box)
+        false = np.log(weight @ np.exp(sensor.log_false_label) * sensor.false_boxes)
+        other = np.log(weight @ np.exp(sensor.log_any_label) * sensor.all_boxes)
         return cls(
             box=box,
             covariance=sensor.noise.covariance(box, camera),
             truncated=cut,
             log_label=np.log(weight @ table.T),
-            log_false=np.log(weight @ np.exp(sensor.log_false_label))
-            + np.log(sensor.false_boxes)
-            + _log_density(camera, box, cut),
+            log_false=false + _log_density(camera, box, cut),
+            log_elsewhere=float(np.sum(other - false) - sensor.all_boxes + sensor.false_boxes),
         )
 
 

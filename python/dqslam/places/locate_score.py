@@ -12,15 +12,18 @@ from typing import Self
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
+from scipy.special import logsumexp
 
 from dqslam import _core
-from dqslam._checks import Floats, Ints
+from dqslam._checks import Bools, Floats, Ints
 from dqslam.places.locate_map import ImageBoxes, PlaceMap
 from dqslam.places.visibility import view_objects
 
 SE3 = _core.PoseModel.SE3
 # Share of the boxes of objects whose errors are larger, and how many times.
 WIDE_SHARE, WIDER = 0.1, 3.0
+# Factors of the rates of detection in an image, and their shares of images.
+QUALITIES = ((1.0, 0.5), (0.6, 0.3), (0.3, 0.2))
 # Objects of a large map that are compared at a pose.
 _MOST_OBJECTS = 200
 # Boxes farther than this from a prediction, in sides of both, do not show the object.
@@ -52,11 +55,14 @@ class Matches:
     box: Ints
     object_row: Ints
 
-    def select(self, keep: Floats | Ints) -> Self:
-        """Return some of the rows."""
+    def select(self, hypotheses: Ints) -> Self:
+        """Return the rows of some hypotheses, which get the numbers 0, 1, ... in that order."""
+        order = np.full(max(self.hypothesis.max(initial=-1), hypotheses.max(initial=-1)) + 1, -1)
+        order[hypotheses] = np.arange(len(hypotheses))
+        keep = order[self.hypothesis] >= 0
         return replace(
             self,
-            hypothesis=self.hypothesis[keep],
+            hypothesis=order[self.hypothesis[keep]],
             frame=self.frame[keep],
             box=self.box[keep],
             object_row=self.object_row[keep],
@@ -74,6 +80,16 @@ class Scored:
     matches: Matches
     missing: Ints
     """Number of objects that each expects in vain, with a rate above one half; shape (h,)."""
+
+    def select(self, rows: Ints) -> Self:
+        """Return some of the hypotheses."""
+        return replace(
+            self,
+            poses=self.poses[rows],
+            score=self.score[rows],
+            matches=self.matches.select(rows),
+            missing=self.missing[rows],
+        )
 
 
 class Scorer:
@@ -115,19 +131,21 @@ class Scorer:
         covariance, _ = self.total_covariance(matches, at[h])
         log_box = self._log_box(at[h], shown, image, b, covariance)
         odds = np.log(rate[h, column]) - np.log1p(-rate[h, column])
-        gain = odds + image.log_label[b, shown] + log_box - image.log_false[b]
-        score = np.log1p(-rate).sum(axis=1)
+        shows = image.log_label[b, shown] + log_box - image.log_false[b]
+        gain = odds + shows
+        score = np.zeros(len(at))
         chosen = []
         positive = np.flatnonzero(gain > 0.0)
         bounds = np.searchsorted(h[positive], np.arange(len(at) + 1))
         for one in range(len(at)):
             own = positive[bounds[one] : bounds[one + 1]]
             best = _assign(b[own], column[own], gain[own])
-            score[one] += gain[own[best]].sum()
+            score[one] = shows[own[best]].sum()
             chosen.append(own[best])
         picked = np.concatenate(chosen) if chosen else np.zeros(0, dtype=np.int64)
         found = np.zeros(rate.shape, dtype=bool)
         found[h[picked], column[picked]] = True
+        score += _log_found(rate, found)
         return score, ((rate > 0.5) & ~found).sum(axis=1), (h[picked], b[picked], shown[picked])
 
     def _objects_near(self, at: Floats) -> Ints:
@@ -261,6 +279,18 @@ class Scorer:
         np.add.at(gradient, matches.hypothesis, np.einsum("mij,mj->mi", whitened, error))
         np.add.at(cost, matches.hypothesis, -total)
         return cost, information, gradient
+
+
+def _log_found(rate: Floats, found: Bools) -> Floats:
+    """Return the log probability that a detector finds just these objects (h, s) of an image.
+
+    Images differ: blur, light and a new side make a detector miss many objects at once.
+    """
+    logs = [
+        np.log(share) + np.where(found, np.log(factor * np.maximum(rate, 1e-12)), np.log1p(-factor * rate)).sum(axis=1)
+        for factor, share in QUALITIES
+    ]
+    return np.asarray(logsumexp(logs, axis=0))
 
 
 def _assign(box: Ints, column: Ints, gain: Floats) -> Ints:

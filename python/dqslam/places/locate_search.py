@@ -7,21 +7,24 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
+from scipy.special import logsumexp
 
 from dqslam import _core
 from dqslam._checks import Bools, Floats, Ints
 from dqslam.places.locate_hypotheses import Hypotheses, Pairings, find_hypotheses, pair_up
 from dqslam.places.locate_map import ImageBoxes, PlaceMap
-from dqslam.places.locate_score import SE3, Frame, Matches, Scorer
+from dqslam.places.locate_score import SE3, Frame, Matches, Scored, Scorer
 
-# Hypotheses of each image that are compared with its boxes quickly, scored, and refined.
-_MOST_QUICK, _MOST_SCORED, _MOST_REFINED = 4000, 40, 12
+# Hypotheses of each image that are compared with its boxes quickly, and scored.
+_MOST_QUICK, _MOST_SCORED = 4000, 30
+# Hypotheses that each round of assignment and refinement continues with.
+_MOST_REFINED = (30, 8, 8)
 # Sigma of the direction of a box's middle: constant [rad], and a share of its half side.
 _RAY_SIGMA, _RAY_SHARE = 0.015, 0.25
-# Poses as near as this are one: a share of the sight, and radians.
+# Poses as near as this lead to the same: a share of the sight, and radians.
 _SAME_SHARE, _SAME_ANGLE = 0.03, 0.1
-# Rounds of assignment and refinement.
-_ROUNDS = 3
+# Poses as near as this are one answer.
+_ONE_SHARE, _ONE_ANGLE = 0.08, 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,12 +34,17 @@ class Places:
     poses: Floats
     """world_from_camera of the reference image, shape (p, 7)."""
     log_odds: Floats
-    """Logarithm of the probability of each, against an image of another place; shape (p,)."""
-    information: Floats
+    """Logarithm of the probability of each, against an image that shows none of the objects here.
+
+    Shape (p,).
+    """
+    covariance: Floats
     """In the tangents of the poses, shape (p, 6, 6)."""
     matches: Matches
     missing: Ints
     """Objects that each expects in vain, shape (p,)."""
+    log_elsewhere: float
+    """Likewise of another place."""
 
 
 def find_places(place: PlaceMap, camera: _core.Camera, frames: list[Frame]) -> Places:
@@ -44,57 +52,80 @@ def find_places(place: PlaceMap, camera: _core.Camera, frames: list[Frame]) -> P
     starts = [_starts(place, camera, frame) for frame in frames]
     poses = np.concatenate([np.zeros((0, 7)), *starts])
     scorer = Scorer(place, camera, frames)
-    if not len(poses):
-        return Places(
-            poses, np.zeros(0), np.zeros((0, 6, 6)), scorer.score(poses).matches, np.zeros(0, int)
-        )
     scored = scorer.score(poses)
-    for turn in range(_ROUNDS):
-        most = _MOST_SCORED if turn == 0 else _MOST_REFINED
-        best = distinct(scored.poses, scored.score, place.sensor.sight, most)
-        scored = scorer.score(scored.poses[best])
+    for most in _MOST_REFINED:
+        scored = scored.select(distinct(scored.poses, scored.score, place.sensor.sight, most))
         poses, _ = scorer.refine(scored)
         scored = scorer.score(poses)
-    return _weigh(place, scorer, scored.poses)
+    return _weigh(place, scorer, scored)
 
 
-def _weigh(place: PlaceMap, scorer: Scorer, poses: Floats) -> Places:
+def _weigh(place: PlaceMap, scorer: Scorer, scored: Scored) -> Places:
     """Give different poses the integral of the probability around each (Laplace)."""
-    scored = scorer.score(poses)
     _, information, _ = scorer.linearize(scored.poses, scored.matches)
     _, log_determinant = np.linalg.slogdet(information)
-    prior = -np.log(place.volume * 8.0 * np.pi**2)
+    prior = np.full(len(scored.poses), -np.log(place.volume * 8.0 * np.pi**2))
     if place.upright is not None:
-        prior += place.upright.log_prior(Rotation.from_quat(poses[:, 3:]).as_matrix())
+        rotation = Rotation.from_quat(scored.poses[:, 3:]).as_matrix()
+        prior += place.upright.log_prior(rotation)
     log_odds = scored.score + prior + 3.0 * np.log(2.0 * np.pi) - 0.5 * log_determinant
-    best = distinct(scored.poses, log_odds, place.sensor.sight, len(poses))
-    order = np.full(len(poses), -1)
-    order[best] = np.arange(len(best))
-    matches = scored.matches.select(order[scored.matches.hypothesis] >= 0)
+    # The size of what a camera may see elsewhere is unknown, hence its prior that of a pose here.
+    elsewhere = sum(frame.boxes.log_elsewhere for frame in scorer.frames)
+    sight = place.sensor.sight
+    best = distinct(scored.poses, log_odds, sight, len(log_odds), _ONE_SHARE, _ONE_ANGLE)
+    joined, covariance = _join(scored.poses, log_odds, np.linalg.inv(information), best, sight)
+    order = np.argsort(-joined, kind="stable")
+    chosen = scored.select(best[order])
     return Places(
-        poses=scored.poses[best],
-        log_odds=log_odds[best],
-        information=information[best],
-        matches=Matches(order[matches.hypothesis], matches.frame, matches.box, matches.object_row),
-        missing=scored.missing[best],
+        chosen.poses, joined[order], covariance[order], chosen.matches, chosen.missing, elsewhere
     )
 
 
-def distinct(poses: Floats, score: Floats, sight: float, most: int) -> Ints:
-    """Return the rows of the best poses, best first, no two of which are the same."""
+def _join(
+    poses: Floats, log_odds: Floats, covariance: Floats, best: Ints, sight: float
+) -> tuple[Floats, Floats]:
+    """Add the poses that are near each of the best to it: log-odds (p,), covariances (p, 6, 6).
+
+    Another assignment of a box moves a pose a little, and is no other answer.
+    """
+    left = np.isfinite(log_odds)
+    joined, spread = np.zeros(len(best)), np.zeros((len(best), 6, 6))
+    for place, row in enumerate(best.tolist()):
+        own = left & _near(poses, poses[[row]], sight, _ONE_SHARE, _ONE_ANGLE)[:, 0]
+        left &= ~own
+        joined[place] = logsumexp(log_odds[own])
+        share = np.exp(log_odds[own] - joined[place])
+        apart = _core.minus(SE3, poses[own], np.tile(poses[row], (int(own.sum()), 1)))
+        outer = apart[:, :, None] * apart[:, None, :]
+        spread[place] = np.einsum("k,kij->ij", share, covariance[own] + outer)
+    return joined, spread
+
+
+def _near(a: Floats, b: Floats, sight: float, share: float, angle: float) -> Bools:
+    """Tell which poses (n, 7) and (m, 7) are nearer than a share of the sight and an angle."""
+    apart = np.linalg.norm(a[:, None, :3] - b[None, :, :3], axis=2)
+    same_half = np.abs(a[:, 3:] @ b[:, 3:].T)  # the cosine of half the angle
+    return np.asarray((apart < share * sight) & (same_half > np.cos(0.5 * angle)))
+
+
+def distinct(
+    poses: Floats,
+    score: Floats,
+    sight: float,
+    most: int,
+    share: float = _SAME_SHARE,
+    angle: float = _SAME_ANGLE,
+) -> Ints:
+    """Return the rows of the best poses, best first, no two of which are near each other."""
     order = np.argsort(-score, kind="stable")
-    rotation = Rotation.from_quat(poses[:, 3:]).as_matrix()
-    chosen: list[int] = []
-    for row in order.tolist():
-        if len(chosen) == most or not np.isfinite(score[row]):
-            break
-        if chosen:
-            near = np.linalg.norm(poses[chosen, :3] - poses[row, :3], axis=1) < _SAME_SHARE * sight
-            trace = np.einsum("nij,ij->n", rotation[chosen], rotation[row])
-            if (near & (trace > 1.0 + 2.0 * np.cos(_SAME_ANGLE))).any():
-                continue
-        chosen.append(row)
-    return np.array(chosen, dtype=np.int64)
+    order = order[np.isfinite(score[order])]
+    same = _near(poses[order], poses[order], sight, share, angle)
+    left, chosen = np.ones(len(order), dtype=bool), []
+    for row in range(len(order)):
+        if left[row] and len(chosen) < most:
+            chosen.append(row)
+            left &= ~same[row]
+    return order[np.array(chosen, dtype=np.int64)]
 
 
 def _starts(place: PlaceMap, camera: _core.Camera, frame: Frame) -> Floats:

@@ -29,6 +29,8 @@ EXPECTED_IN_IMAGE = 0.5
 RATES = (0.01, 0.97)
 # Assumed of a detector without boxes to learn from: rate, false boxes an image, wrong labels.
 ASSUMED_RATE, ASSUMED_FALSE, ASSUMED_CONFUSION = 0.6, 1.0, 0.05
+# Assumed boxes an image without boxes to learn from, and the fewest false ones: places change.
+ASSUMED_ALL, LEAST_FALSE = 8.0, 0.5
 # Images, at most, from which is learned, evenly spaced.
 MOST_IMAGES = 300
 # Boxes as which an assumed rate counts.
@@ -43,12 +45,16 @@ class Sensor:
     """Of the edges of boxes of objects at their places."""
     false_boxes: float
     """Mean number of boxes an image that show no object of the map."""
+    all_boxes: float
+    """Mean number of boxes an image."""
     labels: tuple[str, ...]
     """Class names that boxes or objects have."""
     log_label: Floats
     """Logarithm of the share of an object's boxes with each label, shape (o, labels)."""
     log_false_label: Floats
     """Logarithm of the share of false boxes with each label, shape (labels + 1,): last unknown."""
+    log_any_label: Floats
+    """Likewise of all boxes."""
     rates: Floats
     """Rate of detection by apparent size, shape (sizes, 2): in sight, hidden."""
     rate_shift: Floats
@@ -76,9 +82,11 @@ def assumed_sensor(class_names: tuple[str, ...], sight: float) -> Sensor:
     return Sensor(
         noise=BoxNoise(),
         false_boxes=ASSUMED_FALSE,
+        all_boxes=ASSUMED_ALL,
         labels=labels,
         log_label=_log_labels(np.zeros_like(counts), counts),
-        log_false_label=np.log(np.full(len(labels) + 1, 1.0 / (len(labels) + 1))),
+        log_false_label=_log_shares(np.zeros(len(labels))),
+        log_any_label=_log_shares(counts.sum(axis=0)),
         rates=np.full((len(SIZES) + 1, 2), ASSUMED_RATE) * [1.0, 0.5],
         rate_shift=np.zeros(len(class_names)),
         sight=sight,
@@ -104,20 +112,22 @@ def learn_sensor(
     counts = np.zeros_like(own)
     np.add.at(counts, (shown[shown >= 0], label[shown >= 0]), 1.0)
     images = np.unique(boxes.pose)
+    count = len(images)
     images = images[:: -(-len(images) // MOST_IMAGES)]
     views = view_objects(camera, poses[images], ellipsoids)
     rates, shift = _learn_rates(views, images, boxes.pose, shown)
-    false = np.bincount(label[shown < 0], minlength=len(labels) + 1) + 1.0
     used = np.flatnonzero((shown >= 0) & ~boxes.truncated.any(axis=1))
     used = used[:: -(-max(len(used), 1) // 5000)]
     object_in_view = ellipsoids[shown[shown >= 0], :3] - poses[boxes.pose[shown >= 0], :3]
     distance = np.linalg.norm(object_in_view, axis=1)
     return Sensor(
         noise=_learn_noise(camera, poses, boxes, ellipsoids, used, shown),
-        false_boxes=max(float(np.sum(shown < 0)) / len(np.unique(boxes.pose)), 0.1),
+        false_boxes=max(float(np.sum(shown < 0)) / count, LEAST_FALSE),
+        all_boxes=len(boxes) / count,
         labels=labels,
         log_label=_log_labels(counts, own),
-        log_false_label=np.log(false / false.sum()),
+        log_false_label=_log_shares(np.bincount(label[shown < 0], minlength=len(labels))),
+        log_any_label=_log_shares(np.bincount(label, minlength=len(labels))),
         rates=rates,
         rate_shift=shift,
         sight=float(np.quantile(distance, 0.99)) if distance.size else np.inf,
@@ -129,6 +139,12 @@ def _log_labels(counts: Floats, own: Floats) -> Floats:
     prior = (1.0 - ASSUMED_CONFUSION) * own + ASSUMED_CONFUSION / own.shape[1]
     total = counts.sum(axis=1, keepdims=True) + _PRIOR_BOXES
     return np.asarray(np.log((counts + _PRIOR_BOXES * prior) / total))
+
+
+def _log_shares(counts: Floats | Ints) -> Floats:
+    """Return the logarithms of shares of labels (n,), and of that of all others; (n + 1,)."""
+    more = np.append(counts, 0.0) + 1.0
+    return np.asarray(np.log(more / more.sum()))
 
 
 def _learn_rates(views: Views, images: Ints, box_pose: Ints, shown: Ints) -> tuple[Floats, Floats]:

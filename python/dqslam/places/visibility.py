@@ -19,18 +19,23 @@ class Views:
     in_image: Floats
     """Share of the box that is inside the image, shape (n, o); 0 behind the camera."""
     covered: Floats
-    """Largest share of that part that the box of one nearer object covers, shape (n, o)."""
+    """Largest share of that part that the box of one nearer object covers, shape (n, o).
+
+    Objects that touch each other, like two estimates of one object, do not hide each other.
+    """
     size: Floats
     """Square root of the area of that part, pixels, shape (n, o)."""
     distance: Floats
     """From the camera to the center, meters, shape (n, o)."""
 
 
-def view_objects(camera: _core.Camera, poses: Floats, ellipsoids: Floats) -> Views:
+def view_objects(
+    camera: _core.Camera, poses: Floats, ellipsoids: Floats, hides: Bools | None = None
+) -> Views:
     """Predict the boxes of ellipsoids at poses (n, 7), world_from_camera.
 
     The ellipsoids are the same for each pose, shape (o, 9), or its own, shape (n, o, 9). The camera
-    must have no mount.
+    must have no mount. ``hides`` (o,) are the objects that may hide others, by default all.
     """
     ellipsoids = np.broadcast_to(ellipsoids, (len(poses), *ellipsoids.shape[-2:]))
     n, o = ellipsoids.shape[:2]
@@ -48,18 +53,31 @@ def view_objects(camera: _core.Camera, poses: Floats, ellipsoids: Floats) -> Vie
     in_image = np.where(area > 0.0, area / np.where(whole > 0.0, whole, 1.0), 0.0)
     apart = ellipsoids[..., :3] - poses[:, None, :3]
     distance = np.sqrt((apart**2).sum(axis=-1))
-    return Views(box, in_image, _covered(cut, area, distance), np.sqrt(area), distance)
+    radius = np.linalg.det(_core.ellipsoid_shapes(ellipsoids.reshape(-1, 9))) ** (1.0 / 6.0)
+    front = distance + radius.reshape(n, o)
+    if hides is not None:
+        front = np.where(hides, front, np.inf)
+    back = distance - radius.reshape(n, o)
+    return Views(box, in_image, _covered(cut, area, front, back), np.sqrt(area), distance)
 
 
-def _covered(cut: Floats, area: Floats, distance: Floats) -> Floats:
-    """Return the largest share of each box that one box of a nearer object covers, (n, o)."""
+def _covered(cut: Floats, area: Floats, behind: Floats, before: Floats) -> Floats:
+    """Return the largest share of each box that one box of a nearer object covers, (n, o).
+
+    An object is nearer if its far side, ``behind``, is before the near side of the other.
+    """
+    seen = area > 0.0
+    most = int(seen.sum(axis=1).max(initial=0))
+    row = np.argsort(~seen, axis=1, kind="stable")[:, :most]  # those in the image first
+    box = np.take_along_axis(cut, row[:, :, None], axis=1)
+    own = np.where(np.take_along_axis(seen, row, axis=1), np.take_along_axis(area, row, 1), 1.0)
+    far = np.take_along_axis(behind, row, axis=1)
+    near = np.take_along_axis(before, row, axis=1)
+    low = np.maximum(box[:, :, None, :2], box[:, None, :, :2])
+    high = np.minimum(box[:, :, None, 2:], box[:, None, :, 2:])
+    common = np.maximum(high - low, 0.0).prod(axis=-1) / own[:, :, None]
+    nearer: Bools = far[:, None, :] < near[:, :, None]
+    share = np.where(nearer, np.nan_to_num(common), 0.0).max(axis=2, initial=0.0)
     shares = np.zeros(area.shape)
-    for image in range(len(cut)):
-        rows = np.flatnonzero(area[image] > 0.0)
-        box = cut[image, rows]
-        low = np.maximum(box[:, None, :2], box[None, :, :2])
-        high = np.minimum(box[:, None, 2:], box[None, :, 2:])
-        common = np.maximum(high - low, 0.0).prod(axis=-1) / area[image, rows, None]
-        nearer: Bools = distance[image, rows][None, :] < distance[image, rows][:, None]
-        shares[image, rows] = np.where(nearer, common, 0.0).max(axis=1, initial=0.0)
-    return shares
+    np.put_along_axis(shares, row, share, axis=1)
+    return np.where(seen, shares, 0.0)
