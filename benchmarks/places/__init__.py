@@ -1,0 +1,1 @@
+"""Places: measurements of what is found in maps of one place."""

@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from dqslam import _core
 from dqslam.io import BoxTable, MapObjects, Results
@@ -53,8 +52,13 @@ class Room:
 
     def select(self, rows: np.ndarray) -> Room:
         """Return the room with some of its objects."""
-        names = ("class_id", "semi_axes", "turns", "centers")
-        return replace(self, **{name: getattr(self, name)[rows] for name in names})
+        return replace(
+            self,
+            class_id=self.class_id[rows],
+            semi_axes=self.semi_axes[rows],
+            turns=self.turns[rows],
+            centers=self.centers[rows],
+        )
 
 
 def draw_room(random: np.random.Generator) -> Room:
@@ -62,20 +66,23 @@ def draw_room(random: np.random.Generator) -> Room:
     extent, count = random.uniform(4.0, 10.0), int(random.integers(8, 61))
     classes = int(random.integers(3, 13))
     usual = np.exp(random.normal(np.log(0.12), 0.5, (classes, 3)))
-    return _furnish(extent, usual, random.integers(0, classes, count), random)
+    return furnish(extent, usual, random.integers(0, classes, count), random)
 
 
 def draw_objects(room: Room, count: int, random: np.random.Generator) -> Room:
     """Draw other objects of the classes of a room."""
     rows = random.integers(0, len(room.class_id), count)
     usual = room.semi_axes[[np.flatnonzero(room.class_id == c)[0] for c in room.class_id[rows]]]
-    drawn = _furnish(room.extent, usual, np.arange(count), random)
+    drawn = furnish(room.extent, usual, np.arange(count), random)
     return replace(drawn, class_names=room.class_names, class_id=room.class_id[rows])
 
 
-def _furnish(
+def furnish(
     extent: float, usual: np.ndarray, class_id: np.ndarray, random: np.random.Generator
 ) -> Room:
+    """Draw objects of classes with usual semi-axes (c, 3) anywhere on a floor."""
+    from scipy.spatial.transform import Rotation
+
     count = len(class_id)
     axes = usual[class_id] * np.exp(random.normal(0.0, 0.1, (count, 3)))
     places = np.column_stack(
@@ -89,6 +96,8 @@ def _furnish(
 
 def draw_poses(room: Room, count: int, random: np.random.Generator) -> np.ndarray:
     """Draw poses of a camera that looks at objects, nearly level; world_from_camera, (n, 7)."""
+    from scipy.spatial.transform import Rotation
+
     poses = np.zeros((count, 7))
     for pose in poses:
         pose[:2] = random.uniform(-0.6, 0.6, 2) * room.extent
@@ -121,7 +130,9 @@ def draw_boxes(room: Room, poses: np.ndarray, random: np.random.Generator) -> Se
     pose, row = np.nonzero(seen)
     box = views.box[pose, row]
     side = np.tile(box[:, 2:] - box[:, :2], (1, 2))
-    box = box + random.normal(0.0, PIXELS, box.shape) + random.normal(0.0, RELATIVE, box.shape) * side
+    box = (
+        box + random.normal(0.0, PIXELS, box.shape) + random.normal(0.0, RELATIVE, box.shape) * side
+    )
     false = random.poisson(FALSE_BOXES, len(poses))
     middle = random.uniform([0, 0], [CAMERA.width, CAMERA.height], (false.sum(), 2))
     half = np.exp(random.uniform(np.log(6.0), np.log(100.0), (false.sum(), 2)))
@@ -138,12 +149,25 @@ def draw_boxes(room: Room, poses: np.ndarray, random: np.random.Generator) -> Se
     return Seen(pose[keep], box[keep], class_id[keep], row[keep])
 
 
-def map_room(room: Room, images: int, random: np.random.Generator) -> Results:
-    """Make the map of a visit of so many images: objects with errors, all boxes with the object."""
+def map_room(
+    room: Room, images: int, random: np.random.Generator, *, everything: bool = False
+) -> Results:
+    """Make the map of a visit of so many images; see ``map_with_rows``."""
+    return map_with_rows(room, images, random, everything=everything)[0]
+
+
+def map_with_rows(
+    room: Room, images: int, random: np.random.Generator, *, everything: bool = False
+) -> tuple[Results, np.ndarray]:
+    """Make the map of a visit of so many images: objects with errors, all boxes with the object.
+
+    Objects with less than 3 boxes are not mapped, unless ``everything`` is. Also return the row in
+    the room of each object of the map.
+    """
     poses = draw_poses(room, images, random)
     seen = draw_boxes(room, poses, random)
     counts = np.bincount(seen.object_row[seen.object_row >= 0], minlength=len(room.class_id))
-    known = np.flatnonzero(counts >= 3)
+    known = np.flatnonzero((counts >= 3) | everything)
     mapped = room.select(known)
     centers = mapped.centers + random.normal(0.0, CENTER_SIGMA_M, mapped.centers.shape)
     axes = mapped.semi_axes * np.exp(random.normal(0.0, LOG_SIGMA, mapped.semi_axes.shape))
@@ -172,7 +196,7 @@ def map_room(room: Room, images: int, random: np.random.Generator) -> Results:
         inlier=row_of[seen.object_row] >= 0,
         held_out=np.zeros(len(seen.box), dtype=bool),
     )
-    return Results(
+    results = Results(
         directory=Path("room"),
         camera=CAMERA,
         timestamps=np.arange(float(images)),
@@ -183,6 +207,7 @@ def map_room(room: Room, images: int, random: np.random.Generator) -> Results:
         boxes=boxes,
         report={},
     )
+    return results, known
 
 
 def detections_of(room: Room, seen: Seen) -> Detections:
@@ -210,7 +235,10 @@ def change_room(room: Room, share: float, random: np.random.Generator) -> Room:
 
 def join(room: Room, more: Room) -> Room:
     """Return the objects of both."""
-    names = ("class_id", "semi_axes", "turns", "centers")
     return replace(
-        room, **{name: np.concatenate([getattr(room, name), getattr(more, name)]) for name in names}
+        room,
+        class_id=np.concatenate([room.class_id, more.class_id]),
+        semi_axes=np.concatenate([room.semi_axes, more.semi_axes]),
+        turns=np.concatenate([room.turns, more.turns]),
+        centers=np.concatenate([room.centers, more.centers]),
     )

@@ -78,6 +78,9 @@ if TYPE_CHECKING:  # the one list of public names, a line each: lazy_exports rea
     from dqslam.pipeline import RunResult as RunResult
     from dqslam.pipeline import run as run
     from dqslam.pipeline import run_files as run_files
+    from dqslam.places.changes import Change as Change
+    from dqslam.places.changes import Changes as Changes
+    from dqslam.places.changes import changes as changes
     from dqslam.places.locate import Candidate as Candidate
     from dqslam.places.locate import Location as Location
     from dqslam.places.locate import locate as locate

@@ -6,10 +6,10 @@ It shares no code with the package: boxes are the extremes of points on the surf
 import json
 
 import numpy as np
-from orbit import CAMERA, bounding_box, looking_at_origin, sphere
 from scipy.spatial.transform import Rotation
 
 import dqslam as dq
+from orbit import CAMERA, bounding_box, looking_at_origin, sphere
 
 NAMES = ("cup", "book", "lamp", "cup", "bowl", "book", "cup", "plant")
 CENTERS = np.array(
@@ -101,11 +101,15 @@ def write_map(folder, centers=CENTERS, names=NAMES, poses=None, sigma_m=0.005, w
     ]
     (folder / "map.json").write_text(json.dumps({"objects": objects, "dropped": []}))
     if with_boxes:
-        rows = ["timestamp,x1,y1,x2,y2,truncated,score,class_id,class_name,object_id,inlier,held_out"]
+        rows = [
+            "timestamp,x1,y1,x2,y2,truncated,score,class_id,class_name,object_id,inlier,held_out"
+        ]
         for image, pose in enumerate(poses):
             boxes = boxes_at(pose, centers, names, noise_px=1.0, seed=image)
             for row, (box, name) in enumerate(zip(boxes, names, strict=True)):
                 edges = ",".join(f"{x:.6f}" for x in box)
-                rows.append(f"{image},{edges},,1,{sorted(set(names)).index(name)},{name},{10 + row},1,0")
+                rows.append(
+                    f"{image},{edges},,1,{sorted(set(names)).index(name)},{name},{10 + row},1,0"
+                )
         (folder / "boxes.csv").write_text("\n".join(rows) + "\n")
     return folder

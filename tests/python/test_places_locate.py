@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+
+import dqslam as dq
 from small_place import (
     AXES,
     CENTERS,
@@ -13,8 +15,6 @@ from small_place import (
     pose_at,
     write_map,
 )
-
-import dqslam as dq
 
 SQUARE = np.array([[0.5, 0.5, 0.1], [-0.5, 0.5, 0.1], [-0.5, -0.5, 0.1], [0.5, -0.5, 0.1]])
 
@@ -73,6 +73,7 @@ def test_the_answer_moves_with_the_map(place, tmp_path):
         place.covariances,
         place.sensor,
         None,
+        turn.apply(place.seen_from.reshape(-1, 3)).reshape(place.seen_from.shape),
     )
     there = dq.locate(moved, detections_of(boxes_at(pose)), LENS)
     np.testing.assert_allclose(there.pose[:3], turn.apply(found.pose[:3]) + shift, atol=2e-3)
@@ -100,7 +101,13 @@ def test_a_symmetric_place_is_ambiguous(tmp_path):
     place = dq.PlaceMap.of(dq.load_results(folder))
     spheres = np.array([dq._core.ellipsoid_from_axes(c, [0.1] * 3, [0, 0, 0, 1]) for c in SQUARE])
     place = dq.PlaceMap(
-        place.object_ids, names, spheres, place.covariances, place.sensor, place.upright
+        place.object_ids,
+        names,
+        spheres,
+        place.covariances,
+        place.sensor,
+        place.upright,
+        place.seen_from,
     )
     pose = pose_at(2.0, 0.7, 1.2)
     box, _ = dq._core.project_to_boxes(dq.PoseModel.SE3, LENS, np.tile(pose, (4, 1)), spheres)

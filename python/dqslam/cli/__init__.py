@@ -17,6 +17,7 @@ from dqslam._manifest import ChangedFileWarning
 from dqslam._repr import printable
 from dqslam._version import version
 from dqslam.cli.ablation import ablation
+from dqslam.cli.changes import changes
 from dqslam.cli.convert import convert
 from dqslam.cli.degeneracy import degeneracy
 from dqslam.cli.demo import demo
@@ -35,7 +36,7 @@ from dqslam.cli.worlds import worlds
 COMMANDS: dict[str, tuple[Callable[..., None], ...]] = {
     "Start here": (demo, paper, simulate),
     "Your recording": (inspect, convert, run, evaluate),
-    "Places": (locate,),
+    "Places": (locate, changes),
     "Look": (plot, view),
     "Study": (sweep, worlds, ablation, degeneracy),
 }

@@ -52,10 +52,10 @@ def locate(
     ] = None,
     min_score: Annotated[
         float, typer.Option(help="Leave out boxes with a lower score, 0 to 1.")
-    ] = 0.5,
+    ] = 0.3,
     min_confidence: Annotated[
         float, typer.Option(help="The least probability of an answer.")
-    ] = 0.99,
+    ] = 0.9,
     camera_id: CameraId = None,
     formats: Formats = None,
     frame_times: FrameTimesFile = None,

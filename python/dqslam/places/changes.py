@@ -9,8 +9,6 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import Rotation
-from scipy.stats import chi2 as chi2_distribution
 
 from dqslam._checks import Floats, as_covariances, as_floats
 from dqslam._repr import counted
@@ -54,6 +52,8 @@ class Change:
     """Of the displacement, square meters, with the error of the frames, shape (3, 3)."""
     significance: float | None
     """Probability of a displacement at least as large by errors alone (chi-square)."""
+    size: float
+    """Mean semi-axis, meters."""
     looks: float
     """Boxes that the object should have had in the map that lacks it; in the second map, if it is
     in both."""
@@ -67,6 +67,8 @@ class Changes:
     """Those of the first map in its order, then those that are only in the second."""
     second_from_first: Floats
     """Pose that was used, fitted by the objects that stayed, shape (4, 4)."""
+    cameras: Floats
+    """Poses of the images of the second map, world_from_camera, shape (n, 7)."""
 
     def of(self, status: Status) -> tuple[Change, ...]:
         """Return the objects of a status."""
@@ -121,6 +123,8 @@ def changes(
     >>> {one.status for one in found.objects}
     {'stayed'}
     """
+    from scipy.spatial.transform import Rotation
+
     before, after = _results(first), _results(second)
     pose = _pose(second_from_first)
     spread = np.diag([FRAME_SIGMA_M**2] * 3 + [FRAME_SIGMA_RAD**2] * 3)
@@ -133,7 +137,8 @@ def changes(
     found = match_maps(one, other, looks_after, looks_before)
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = Rotation.from_quat(pose[3:]).as_matrix(), pose[:3]
-    return Changes(tuple(_described(one, other, found, looks_after, looks_before)), matrix)
+    objects = tuple(_described(one, other, found, looks_after, looks_before))
+    return Changes(objects, matrix, other.poses)
 
 
 def _results(source: Results | str | Path) -> Results:
@@ -141,6 +146,8 @@ def _results(source: Results | str | Path) -> Results:
 
 
 def _pose(second_from_first: ArrayLike | None) -> Floats:
+    from scipy.spatial.transform import Rotation
+
     if second_from_first is None:
         return np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
     matrix = as_floats("second_from_first", second_from_first, [4, 4])
@@ -158,6 +165,8 @@ def _fit_frames(
 
     What is given is the prior, so that few objects change little.
     """
+    from scipy.spatial.transform import Rotation
+
     information = np.linalg.inv(prior)
     start, spread = pose, prior
     for _ in range(_ROUNDS):
@@ -188,6 +197,8 @@ def _fit_frames(
 
 def _minus(pose: Floats, start: Floats) -> Floats:
     """Return translation and rotation vector that move a pose to another, in the common frame."""
+    from scipy.spatial.transform import Rotation
+
     turn = Rotation.from_quat(pose[3:]) * Rotation.from_quat(start[3:]).inv()
     return np.concatenate([pose[:3] - turn.apply(start[:3]), turn.as_rotvec()])
 
@@ -233,6 +244,7 @@ def _described(
                 displacement=None,
                 covariance=None,
                 significance=None,
+                size=float(np.exp(other.log_size[row, 0])),
                 looks=float(looks_before[row]),
             )
         )
@@ -242,7 +254,9 @@ def _described(
 def _first_change(
     one: SeenMap, other: SeenMap, found: Assignment, row: int, looks: Floats
 ) -> Change:
-    match = int(found.second[row])
+    from scipy.stats import chi2 as chi2_distribution
+
+    match, size = int(found.second[row]), float(np.exp(one.log_size[row, 0]))
     stayed, moved, vanished = (
         float(part[row]) for part in (found.stayed, found.moved, found.vanished)
     )
@@ -261,6 +275,7 @@ def _first_change(
             None,
             None,
             None,
+            size,
             float(looks[row]),
         )
     displacement = other.centers[match] - one.centers[row]
@@ -278,5 +293,6 @@ def _first_change(
         displacement=displacement,
         covariance=covariance,
         significance=float(chi2_distribution.sf(chi2, 3)),
+        size=size,
         looks=float(looks[row]),
     )

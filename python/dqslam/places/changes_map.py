@@ -6,13 +6,12 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
-from scipy.spatial.transform import Rotation
-from scipy.stats import poisson
 
 from dqslam import _core
 from dqslam._checks import Floats, Ints
 from dqslam.io import MapObjects, Results
 from dqslam.io.results import ellipsoid_covariances
+from dqslam.places.locate_upright import find_up
 from dqslam.places.sensor import Sensor, learn_sensor
 from dqslam.places.visibility import view_objects
 
@@ -20,7 +19,7 @@ from dqslam.places.visibility import view_objects
 FEWEST_BOXES = 3.0
 # An object in view is not mapped for reasons that no look shows: it was joined with another, or
 # was refused.
-UNMAPPED = 0.04
+UNMAPPED = 0.02
 # Images, at most, whose views are compared, evenly spaced.
 _MOST_IMAGES = 400
 _SE3 = _core.PoseModel.SE3
@@ -47,6 +46,8 @@ class SeenMap:
     camera: _core.Camera
     poses: Floats
     """Of the images with boxes, common_from_camera, shape (n, 7)."""
+    up: Floats | None
+    """The direction up, if the cameras show it, shape (3,)."""
     image_share: float
     """Images that were taken, for each of these."""
 
@@ -80,6 +81,7 @@ class SeenMap:
             chosen = results.poses[images[::step]]
             share = len(images) / len(chosen)
             poses = _core.compose(_SE3, np.tile(common_from_map, (len(chosen), 1)), chosen)
+        upright = find_up(poses)
         moved = _moved(objects, rows, common_from_map)
         covariances = ellipsoid_covariances(moved, np.arange(len(rows)))
         sigma = np.sqrt((np.nan_to_num(moved.log_semi_axes_sigmas, nan=0.1) ** 2).sum(axis=1)) / 3
@@ -93,6 +95,7 @@ class SeenMap:
             sensor=sensor,
             camera=results.camera,
             poses=poses,
+            up=None if upright is None else upright.up,
             image_share=share,
         )
 
@@ -123,11 +126,15 @@ class SeenMap:
 
 def missed(expected: Floats) -> Floats:
     """Return the probability that an object is not mapped where it should have so many boxes."""
-    return np.asarray(UNMAPPED + (1.0 - UNMAPPED) * poisson.cdf(FEWEST_BOXES - 1.0, expected))
+    from scipy.special import pdtr
+
+    return np.asarray(UNMAPPED + (1.0 - UNMAPPED) * pdtr(FEWEST_BOXES - 1.0, expected))
 
 
 def _moved(objects: MapObjects, rows: Ints, pose: Floats) -> MapObjects:
     """Return some objects of a map, moved by a pose (7,)."""
+    from scipy.spatial.transform import Rotation
+
     turn = Rotation.from_quat(pose[3:])
     matrix = turn.as_matrix()
     quaternions = (turn * Rotation.from_quat(objects.orientations[rows])).as_quat()

@@ -11,23 +11,25 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from dqslam._checks import Floats, Ints
 from dqslam.places.changes_map import SeenMap, missed
 
 # Prior probabilities: an object stays, moves, vanishes; one of the second map is new.
-STAYS, MOVES, VANISHES, APPEARS = 0.8, 0.08, 0.06, 0.06
+STAYS, MOVES, VANISHES, APPEARS = 0.7, 0.1, 0.1, 0.1
 # Error of a center that covariances do not show, as a share of the mean semi-axis, and meters.
 CENTER_SHARE, CENTER_M = 0.3, 0.01
-# Displacements of moved objects: sigma [m] of half of them; the others are moved anywhere.
-MOVED_M = 1.0
+# Displacements of moved objects: sigma [m], and the share that is moved anywhere.
+MOVED_M, ANYWHERE = 0.8, 0.02
+# The share of objects that stay on what they stand on, and the sigmas of heights [m]: theirs, beside
+# the covariance, and that of the others.
+ON_SURFACE, SURFACE_M, OTHER_SURFACE_M = 0.85, 0.03, 0.4
 # Spread of the logarithm of the size of an object between two maps, and between objects of a class.
 SIZE_SIGMA, CLASS_SIGMA = 0.15, 0.6
 # Probability of another class for the same object, if no boxes show how often that happens.
 CONFUSED = 0.02
 # Share of errors of stayed objects that are larger, and how many times.
-WIDE_SHARE, WIDER = 0.05, 3.0
+WIDE_SHARE, WIDER = 0.03, 2.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +56,8 @@ def match_maps(
     ``looks_in_second`` (a,) are the boxes that objects of the first map should have had in the
     second, ``looks_in_first`` (b,) likewise.
     """
+    from scipy.optimize import linear_sum_assignment
+
     stay, move = _log_same(first, second)
     unseen = missed(looks_in_second)
     unseen_before = missed(looks_in_first)
@@ -115,16 +119,34 @@ def _log_same(first: SeenMap, second: SeenMap) -> tuple[Floats, Floats]:
         np.log1p(-WIDE_SHARE) + peak - 0.5 * chi2,
         np.log(WIDE_SHARE / WIDER**3) + peak - 0.5 * chi2 / WIDER**2,
     )
-    square = (difference**2).sum(axis=2)
+    near = _log_displacement(difference, total, second.up)
     extent = np.ptp(np.vstack([first.centers, second.centers]), axis=0) + 1.0
-    near = -0.5 * square / MOVED_M**2 - 1.5 * np.log(2.0 * np.pi * MOVED_M**2)
-    move = np.logaddexp(np.log(0.5) + near, np.log(0.5) - np.log(extent.prod()))
+    anywhere = np.log(ANYWHERE) - np.log(extent.prod())
+    move = np.logaddexp(np.log1p(-ANYWHERE) + near, anywhere)
     change = second.log_size[None, :, 0] - first.log_size[:, None, 0]
     variance = first.log_size[:, None, 1] ** 2 + second.log_size[None, :, 1] ** 2 + SIZE_SIGMA**2
     size = -0.5 * change**2 / variance - 0.5 * np.log(variance)
     size -= -0.5 * change**2 / (variance + CLASS_SIGMA**2) - 0.5 * np.log(variance + CLASS_SIGMA**2)
     labels = _log_class(first, second)
     return stay + size + labels, move + size + labels
+
+
+def _log_displacement(difference: Floats, covariance: Floats, up: Floats | None) -> Floats:
+    """Return the log density of displacements (a, b, 3) of moved objects, shape (a, b).
+
+    ``covariance`` (a, b, 3, 3) is that of the errors of both places. Without ``up`` (3,), heights
+    are as any direction.
+    """
+    square = (difference**2).sum(axis=2)
+    if up is None:
+        return -0.5 * square / MOVED_M**2 - 1.5 * np.log(2.0 * np.pi * MOVED_M**2)
+    rise, variance = difference @ up, np.einsum("abij,i,j->ab", covariance, up, up)
+    along = -0.5 * (square - rise**2) / MOVED_M**2 - np.log(2.0 * np.pi * MOVED_M**2)
+    parts = []
+    for share, sigma in ((ON_SURFACE, SURFACE_M), (1.0 - ON_SURFACE, OTHER_SURFACE_M)):
+        both = variance + sigma**2
+        parts.append(np.log(share) - 0.5 * rise**2 / both - 0.5 * np.log(2.0 * np.pi * both))
+    return np.asarray(along + np.logaddexp(*parts))
 
 
 def _log_class(first: SeenMap, second: SeenMap) -> Floats:

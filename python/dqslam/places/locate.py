@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import expit, logsumexp
 
 from dqslam import _core
 from dqslam._checks import Floats, Ints, as_floats, reject_rows
@@ -24,7 +23,7 @@ from dqslam.recording import Detections
 
 # A model of independent errors is too sure of itself: of its log-odds m, this much is right,
 # offset + slope * m, as counted in simulated rooms (docs/locate.md).
-CALIBRATED_OFFSET, CALIBRATED_SLOPE = -1.7, 0.47
+CALIBRATED_OFFSET, CALIBRATED_SLOPE = -2.0, 0.5
 # Images of a sequence that vote, at most: those with the most boxes.
 MOST_IMAGES = 12
 # An image of fewer boxes is left out; a pose of fewer matches is no answer.
@@ -100,7 +99,7 @@ def locate(
     labels: Sequence[Mapping[str, float]] | None = None,
     odometry: ArrayLike | None = None,
     odometry_noise: OdometryNoise | None = None,
-    min_confidence: float = 0.99,
+    min_confidence: float = 0.9,
 ) -> Location:
     """Find where a camera is in a map, from boxes and their classes, or say that it is not sure.
 
@@ -237,9 +236,9 @@ def _probabilities(places: Places) -> list[float]:
     if not len(places.log_odds):
         return []
     every = np.append(places.log_odds, places.log_elsewhere)
-    margin = every[0] - logsumexp(every[1:])
-    best = float(expit(CALIBRATED_OFFSET + CALIBRATED_SLOPE * margin))
-    others = np.exp(every[1:] - logsumexp(every[1:])) * (1.0 - best)
+    margin = every[0] - np.logaddexp.reduce(every[1:])
+    best = float(1.0 / (1.0 + np.exp(-CALIBRATED_OFFSET - CALIBRATED_SLOPE * margin)))
+    others = np.exp(every[1:] - np.logaddexp.reduce(every[1:])) * (1.0 - best)
     return [best, *others[:-1].tolist()]
 
 

@@ -20,7 +20,7 @@ from dqslam.places.locate_map import PlaceMap
 from dqslam.recording import Detections
 
 TABLE = "locations.csv"
-_COLUMNS = ("timestamp", *(f"{name}" for name in "x y z qx qy qz qw".split()), "confidence")
+_COLUMNS = ("timestamp", "x", "y", "z", "qx", "qy", "qz", "qw", "confidence")
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,8 +40,8 @@ def locate_files(
     detections: str | Path,
     odometry: str | Path | None = None,
     *,
-    min_score: float = 0.5,
-    min_confidence: float = 0.99,
+    min_score: float = 0.3,
+    min_confidence: float = 0.9,
     formats: files.FormatNames | None = None,
     frames: FrameTimes | None = None,
     reading: ReadOptions | None = None,
@@ -157,9 +157,7 @@ def write_locations(folder: Path, answers: list[ImageLocation]) -> None:
         reason = found.reason.replace('"', "'")
         lines.append(",".join([*cells, f"{found.confidence:.6f}", f'"{reason}"']))
     write_text(folder / TABLE, "\n".join(lines) + "\n")
-    files.write_json(
-        folder / "locations.json", {"images": [described(one) for one in answers]}
-    )
+    files.write_json(folder / "locations.json", {"images": [described(one) for one in answers]})
 
 
 def described(answer: ImageLocation) -> dict[str, object]:

@@ -12,7 +12,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from dqslam import _core
 from dqslam._checks import Bools, Floats, Ints
@@ -85,7 +84,7 @@ def pair_up(place: PlaceMap, camera: _core.Camera, image: ImageBoxes) -> Pairing
     best = image.log_label.max(axis=1, keepdims=True)
     box, row = np.nonzero(image.log_label > best + np.log(_LEAST_LABEL))
     size = place.size[row]
-    cut = image.truncated.any(axis=1)[box]
+    cut = np.asarray(image.truncated.any(axis=1))[box]
     return Pairings(
         box=box,
         object_row=row,
@@ -117,15 +116,15 @@ def find_hypotheses(pairings: Pairings, whole: Bools, upright: Upright | None) -
 
 def _agreeing_pairs(pairings: Pairings, rows: Ints) -> Ints:
     """Return pairs of pairings, the first of the lower box, whose distances agree, shape (p, 2)."""
+    from scipy.spatial import cKDTree
+
     of_box = [rows[pairings.box[rows] == one] for one in np.unique(pairings.box[rows])]
     trees = [cKDTree(pairings.center[one]) for one in of_box]
     far = [np.exp((pairings.log_distance + _AGREE * pairings.sigma)[one].max()) for one in of_box]
     found = [np.zeros((0, 2), dtype=np.int64)]
     for a in range(len(of_box)):
         for b in range(a + 1, len(of_box)):
-            near = trees[a].sparse_distance_matrix(
-                trees[b], far[a] + far[b], output_type="ndarray"
-            )
+            near = trees[a].sparse_distance_matrix(trees[b], far[a] + far[b], output_type="ndarray")
             i, j, distance = of_box[a][near["i"]], of_box[b][near["j"]], near["v"]
             found.append(np.column_stack([i, j])[_agrees(pairings, i, j, distance)])
     return np.concatenate(found)
@@ -162,7 +161,7 @@ def _triples(pairs: Ints, count: int) -> Ints:
     wanted = pairs[pair, 0] * count + third
     place = np.minimum(np.searchsorted(known, wanted), max(len(known) - 1, 0))
     closed = known[place] == wanted if len(known) else np.zeros(0, dtype=bool)
-    return np.column_stack([pairs[pair], third])[closed]
+    return np.asarray(np.column_stack([pairs[pair], third])[closed])
 
 
 def _resect(pairings: Pairings, triples: Ints) -> Hypotheses:

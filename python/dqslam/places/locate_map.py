@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from dqslam import _core
 from dqslam._checks import Bools, Floats, Ints
@@ -24,6 +23,8 @@ _ASSUMED_SIGHT = 40.0
 _SIZE_SIGMA = 0.1
 # The ratio of the axes, as a logarithm, that becomes a part of that spread.
 _ASPECT_SHARE = 0.3
+# Directions from which the map saw an object, at most.
+_MOST_DIRECTIONS = 32
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +42,11 @@ class PlaceMap:
     sensor: Sensor
     upright: Upright | None
     """Which way is up, if the map's own cameras show it."""
+    seen_from: Floats
+    """Directions from each object to cameras that saw it, unit vectors, shape (o, d, 3).
+
+    NaN where there are fewer; d is 0 without boxes.
+    """
 
     @classmethod
     def of(cls, results: Results) -> Self:
@@ -71,11 +77,14 @@ class PlaceMap:
             covariances=ellipsoid_covariances(objects, rows),
             sensor=sensor,
             upright=find_up(results.poses),
+            seen_from=_seen_from(results, ids, ellipsoids),
         )
 
     @cached_property
-    def tree(self) -> cKDTree:
+    def tree(self) -> Any:
         """The centers of the objects, for search by place."""
+        from scipy.spatial import cKDTree
+
         return cKDTree(self.ellipsoids[:, :3])
 
     @cached_property
@@ -87,11 +96,38 @@ class PlaceMap:
         spread = np.sqrt(np.diagonal(self.covariances[:, 3:, 3:], axis1=1, axis2=2).sum(axis=1)) / 3
         return np.column_stack([logs.mean(axis=1), np.hypot(np.hypot(_SIZE_SIGMA, aspect), spread)])
 
+    def new_view(self, rows: Ints, position: Floats) -> Floats:
+        """Return angles (m,) between views of objects (m,) from positions (m, 3) and the map's.
+
+        That is to the nearest view of the map. 0 if these are not known.
+        """
+        if not self.seen_from.shape[1]:
+            return np.zeros(len(rows))
+        direction = position - self.ellipsoids[rows, :3]
+        direction = direction / np.linalg.norm(direction, axis=1, keepdims=True)
+        cosine = np.einsum("mdi,mi->md", self.seen_from[rows], direction)
+        best = np.fmax.reduce(cosine, axis=1, initial=-1.0)
+        known = np.isfinite(cosine[:, 0])
+        return np.where(known, np.arccos(np.clip(best, -1.0, 1.0)), 0.0)
+
     @cached_property
     def volume(self) -> float:
         """Cubic meters in which a camera may be: the box around the objects and half a sight."""
         extent = np.ptp(self.ellipsoids[:, :3], axis=0) + self.sensor.sight
         return float(extent.prod())
+
+
+def _seen_from(results: Results, ids: Ints, ellipsoids: Floats) -> Floats:
+    found = np.full((len(ids), 0, 3), np.nan)
+    if results.boxes is None:
+        return found
+    found = np.full((len(ids), _MOST_DIRECTIONS, 3), np.nan)
+    for row, number in enumerate(ids.tolist()):
+        poses = results.boxes.pose[results.boxes.object_id == number]
+        poses = poses[:: -(-max(len(poses), 1) // _MOST_DIRECTIONS)]
+        direction = results.poses[poses, :3] - ellipsoids[row, :3]
+        found[row, : len(poses)] = direction / np.linalg.norm(direction, axis=1, keepdims=True)
+    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +175,7 @@ class ImageBoxes:
         other = np.log(weight @ np.exp(sensor.log_any_label) * sensor.all_boxes)
         return cls(
             box=box,
-            covariance=sensor.noise.covariance(box, camera),
+            covariance=sensor.box_covariance(box, camera),
             truncated=cut,
             log_label=np.log(weight @ table.T),
             log_false=false + _log_density(camera, box, cut),

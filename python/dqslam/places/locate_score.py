@@ -11,8 +11,6 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
-from scipy.special import logsumexp
 
 from dqslam import _core
 from dqslam._checks import Bools, Floats, Ints
@@ -22,6 +20,9 @@ from dqslam.places.visibility import view_objects
 SE3 = _core.PoseModel.SE3
 # Share of the boxes of objects whose errors are larger, and how many times.
 WIDE_SHARE, WIDER = 0.1, 3.0
+# The angle [rad] to the nearest view of the map at which the variance of a box is twice that of the
+# map's boxes, and the most that it grows by.
+_NEW_VIEW, _MOST_NEW = 0.5, 4.0
 # Factors of the rates of detection in an image, and their shares of images.
 QUALITIES = ((1.0, 0.5), (0.6, 0.3), (0.3, 0.2))
 # Objects of a large map that are compared at a pose.
@@ -182,14 +183,19 @@ class Scorer:
         Also return the Jacobians (m, 4, 6) by the tangents of the poses ``at`` (m, 7) of images.
         """
         rows = matches.object_row
-        _, _, jacobian = _core.differentiate_boxes(SE3, self.camera, at, self.place.ellipsoids[rows])
+        _, _, jacobian = _core.differentiate_boxes(
+            SE3, self.camera, at, self.place.ellipsoids[rows]
+        )
         jacobian = np.nan_to_num(jacobian)
         by_pose, by_object = jacobian[:, :, :6], jacobian[:, :, 6:]
         total = by_object @ self.place.covariances[rows] @ by_object.transpose(0, 2, 1)
+        # No object is an ellipsoid: from a new side, its outline is not where the map's boxes fit.
+        new = (self.place.new_view(rows, at[:, :3]) / _NEW_VIEW) ** 2
+        wider = 1.0 + np.minimum(new, _MOST_NEW)[:, None, None]
         for number, frame in enumerate(self.frames):
             own = matches.frame == number
             drift = by_pose[own] @ frame.covariance @ by_pose[own].transpose(0, 2, 1)
-            total[own] += frame.boxes.covariance[matches.box[own]] + drift
+            total[own] += wider[own] * frame.boxes.covariance[matches.box[own]] + drift
         return total, by_pose
 
     def _log_box(
@@ -201,7 +207,8 @@ class Scorer:
         variance = np.diagonal(covariance, axis1=1, axis2=2)
         peak = -0.5 * (np.where(free, np.log(variance) + _LOG_2PI, 0.0)).sum(axis=1)
         wide = peak - free.sum(axis=1) * np.log(WIDER) - 0.5 * chi2 / WIDER**2
-        return np.logaddexp(np.log1p(-WIDE_SHARE) + peak - 0.5 * chi2, np.log(WIDE_SHARE) + wide)
+        narrow = np.log1p(-WIDE_SHARE) + peak - 0.5 * chi2
+        return np.asarray(np.logaddexp(narrow, np.log(WIDE_SHARE) + wide))
 
     def chi_squares(
         self, at: Floats, rows: Ints, image: ImageBoxes, box: Ints, covariance: Floats
@@ -287,14 +294,19 @@ def _log_found(rate: Floats, found: Bools) -> Floats:
     Images differ: blur, light and a new side make a detector miss many objects at once.
     """
     logs = [
-        np.log(share) + np.where(found, np.log(factor * np.maximum(rate, 1e-12)), np.log1p(-factor * rate)).sum(axis=1)
+        np.log(share)
+        + np.where(found, np.log(factor * np.maximum(rate, 1e-12)), np.log1p(-factor * rate)).sum(
+            axis=1
+        )
         for factor, share in QUALITIES
     ]
-    return np.asarray(logsumexp(logs, axis=0))
+    return np.asarray(np.logaddexp.reduce(logs, axis=0))
 
 
 def _assign(box: Ints, column: Ints, gain: Floats) -> Ints:
     """Choose the rows whose gains have the largest sum, a box and an object once each."""
+    from scipy.optimize import linear_sum_assignment
+
     if not len(gain):
         return np.zeros(0, dtype=np.int64)
     boxes, b = np.unique(box, return_inverse=True)

@@ -5,9 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
-from scipy.spatial.transform import Rotation
-from scipy.special import logsumexp
 
 from dqslam import _core
 from dqslam._checks import Bools, Floats, Ints
@@ -16,15 +13,15 @@ from dqslam.places.locate_map import ImageBoxes, PlaceMap
 from dqslam.places.locate_score import SE3, Frame, Matches, Scored, Scorer
 
 # Hypotheses of each image that are compared with its boxes quickly, and scored.
-_MOST_QUICK, _MOST_SCORED = 4000, 30
+_MOST_QUICK, _MOST_SCORED = 4000, 24
 # Hypotheses that each round of assignment and refinement continues with.
-_MOST_REFINED = (30, 8, 8)
+_MOST_REFINED = (24, 8, 8)
 # Sigma of the direction of a box's middle: constant [rad], and a share of its half side.
 _RAY_SIGMA, _RAY_SHARE = 0.015, 0.25
 # Poses as near as this lead to the same: a share of the sight, and radians.
 _SAME_SHARE, _SAME_ANGLE = 0.03, 0.1
 # Poses as near as this are one answer.
-_ONE_SHARE, _ONE_ANGLE = 0.08, 0.2
+_ONE_SHARE, _ONE_ANGLE = 0.12, 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +59,8 @@ def find_places(place: PlaceMap, camera: _core.Camera, frames: list[Frame]) -> P
 
 def _weigh(place: PlaceMap, scorer: Scorer, scored: Scored) -> Places:
     """Give different poses the integral of the probability around each (Laplace)."""
+    from scipy.spatial.transform import Rotation
+
     _, information, _ = scorer.linearize(scored.poses, scored.matches)
     _, log_determinant = np.linalg.slogdet(information)
     prior = np.full(len(scored.poses), -np.log(place.volume * 8.0 * np.pi**2))
@@ -73,7 +72,13 @@ def _weigh(place: PlaceMap, scorer: Scorer, scored: Scored) -> Places:
     elsewhere = sum(frame.boxes.log_elsewhere for frame in scorer.frames)
     sight = place.sensor.sight
     best = distinct(scored.poses, log_odds, sight, len(log_odds), _ONE_SHARE, _ONE_ANGLE)
-    joined, covariance = _join(scored.poses, log_odds, np.linalg.inv(information), best, sight)
+    joined, covariance = _join(
+        scored.poses,
+        log_odds,
+        np.asarray(np.linalg.inv(information), dtype=np.float64),
+        best,
+        sight,
+    )
     order = np.argsort(-joined, kind="stable")
     chosen = scored.select(best[order])
     return Places(
@@ -93,7 +98,7 @@ def _join(
     for place, row in enumerate(best.tolist()):
         own = left & _near(poses, poses[[row]], sight, _ONE_SHARE, _ONE_ANGLE)[:, 0]
         left &= ~own
-        joined[place] = logsumexp(log_odds[own])
+        joined[place] = np.logaddexp.reduce(log_odds[own])
         share = np.exp(log_odds[own] - joined[place])
         apart = _core.minus(SE3, poses[own], np.tile(poses[row], (int(own.sum()), 1)))
         outer = apart[:, :, None] * apart[:, None, :]
@@ -120,7 +125,8 @@ def distinct(
     order = np.argsort(-score, kind="stable")
     order = order[np.isfinite(score[order])]
     same = _near(poses[order], poses[order], sight, share, angle)
-    left, chosen = np.ones(len(order), dtype=bool), []
+    left = np.ones(len(order), dtype=np.bool_)
+    chosen: list[int] = []
     for row in range(len(order)):
         if left[row] and len(chosen) < most:
             chosen.append(row)
@@ -130,9 +136,11 @@ def distinct(
 
 def _starts(place: PlaceMap, camera: _core.Camera, frame: Frame) -> Floats:
     """Return the best hypotheses of an image as poses of the reference image, shape (h, 7)."""
+    from scipy.spatial.transform import Rotation
+
     image = frame.boxes
     pairings = pair_up(place, camera, image)
-    whole = ~image.truncated.any(axis=1)
+    whole = np.asarray(~image.truncated.any(axis=1))
     found = _strongest(find_hypotheses(pairings, whole, place.upright), place.sensor.sight)
     score = _quick_score(place, image, pairings, found)
     if place.upright is not None:
@@ -147,6 +155,8 @@ def _starts(place: PlaceMap, camera: _core.Camera, frame: Frame) -> Floats:
 
 def _strongest(found: Hypotheses, sight: float) -> Hypotheses:
     """Return the hypotheses that most others are near to, if there are very many."""
+    from scipy.spatial import cKDTree
+
     count = len(found.position)
     if count <= _MOST_QUICK:
         return found
@@ -176,7 +186,7 @@ def _quick_score(
     sigma_ray = np.hypot(_RAY_SIGMA, _RAY_SHARE * half)
     first = np.flatnonzero(np.concatenate([[True], box[1:] != box[:-1]]))
     score = np.zeros(len(found.position))
-    chunk = max(1, 2_000_000 // len(box))
+    chunk = max(1, 300_000 // len(box))
     for start in range(0, len(score), chunk):
         part = slice(start, start + chunk)
         rotation, position = found.rotation[part], found.position[part]

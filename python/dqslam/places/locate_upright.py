@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from dqslam._checks import Floats
 
@@ -32,7 +31,7 @@ class Upright:
         # Any tilt is as likely as any other on a sphere, with density 1/2, either side up.
         normal = np.exp(-0.5 * (tilt / self.sigma) ** 2) / (self.sigma * np.sqrt(2.0 * np.pi))
         is_up = self.up @ rotation[:, :, 1].T < 0.0
-        return np.log(_ANY_TILT + (1.0 - _ANY_TILT) * 4.0 * normal * is_up)
+        return np.asarray(np.log(_ANY_TILT + (1.0 - _ANY_TILT) * 4.0 * normal * is_up))
 
 
 def find_up(poses: Floats) -> Upright | None:
@@ -40,6 +39,8 @@ def find_up(poses: Floats) -> Upright | None:
 
     A camera that never turns does not: any direction across its x axis may be up.
     """
+    from scipy.spatial.transform import Rotation
+
     if len(poses) < 2:
         return None
     axes = Rotation.from_quat(poses[:, 3:]).as_matrix()

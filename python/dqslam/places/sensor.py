@@ -10,8 +10,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import nnls
-from scipy.special import expit, logit
 
 from dqslam import _core
 from dqslam._checks import Floats, Ints
@@ -43,6 +41,8 @@ class Sensor:
 
     noise: BoxNoise
     """Of the edges of boxes of objects at their places."""
+    correlation: float
+    """Between the errors of opposite edges: a box is rather shifted than too large."""
     false_boxes: float
     """Mean number of boxes an image that show no object of the map."""
     all_boxes: float
@@ -62,6 +62,15 @@ class Sensor:
     sight: float
     """Distance within which objects are seen, meters."""
 
+    def box_covariance(self, box: Floats, camera: _core.Camera) -> Floats:
+        """Return the covariance [px^2] of the edges of boxes (b, 4), shape (b, 4, 4)."""
+        covariance = self.noise.covariance(box, camera)
+        sigma = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
+        for low in (0, 1):
+            both = self.correlation * sigma[:, low] * sigma[:, low + 2]
+            covariance[:, low, low + 2] = covariance[:, low + 2, low] = both
+        return covariance
+
     def detection_rate(self, views: Views, rows: Ints | None = None) -> Floats:
         """Return the probability that each object gets a box, shape (n, o).
 
@@ -69,7 +78,9 @@ class Sensor:
         """
         size = np.searchsorted(SIZES, views.size)
         rate = self.rates[size, (views.covered > HIDDEN).astype(np.int64)]
-        rate = expit(logit(rate) + self.rate_shift[slice(None) if rows is None else rows])
+        rate = _from_log_odds(
+            _log_odds(rate) + self.rate_shift[slice(None) if rows is None else rows]
+        )
         # A part of an object at the border is found less often, by an unknown amount.
         seen = np.clip(views.in_image / EXPECTED_IN_IMAGE - 0.5, 0.0, 1.0)
         return np.asarray(np.clip(rate * seen, 1e-3, RATES[1]))
@@ -81,6 +92,7 @@ def assumed_sensor(class_names: tuple[str, ...], sight: float) -> Sensor:
     counts = np.array([[name == label for label in labels] for name in class_names], dtype=float)
     return Sensor(
         noise=BoxNoise(),
+        correlation=0.0,
         false_boxes=ASSUMED_FALSE,
         all_boxes=ASSUMED_ALL,
         labels=labels,
@@ -120,8 +132,10 @@ def learn_sensor(
     used = used[:: -(-max(len(used), 1) // 5000)]
     object_in_view = ellipsoids[shown[shown >= 0], :3] - poses[boxes.pose[shown >= 0], :3]
     distance = np.linalg.norm(object_in_view, axis=1)
+    noise, correlation = _learn_noise(camera, poses, boxes, ellipsoids, used, shown)
     return Sensor(
-        noise=_learn_noise(camera, poses, boxes, ellipsoids, used, shown),
+        noise=noise,
+        correlation=correlation,
         false_boxes=max(float(np.sum(shown < 0)) / count, LEAST_FALSE),
         all_boxes=len(boxes) / count,
         labels=labels,
@@ -169,7 +183,15 @@ def _learn_rates(views: Views, images: Ints, box_pose: Ints, shown: Ints) -> tup
     count = expected.sum(axis=0) + 2 * _PRIOR_BOXES
     usual = np.clip((predicted + _PRIOR_BOXES) / count, *RATES)
     own = np.clip(((found & expected).sum(axis=0) + _PRIOR_BOXES) / count, *RATES)
-    return rates, np.asarray(logit(own) - logit(usual))
+    return rates, _log_odds(own) - _log_odds(usual)
+
+
+def _log_odds(probability: Floats) -> Floats:
+    return np.asarray(np.log(probability) - np.log1p(-probability))
+
+
+def _from_log_odds(log_odds: Floats) -> Floats:
+    return np.asarray(1.0 / (1.0 + np.exp(-log_odds)))
 
 
 def _learn_noise(
@@ -179,14 +201,19 @@ def _learn_noise(
     ellipsoids: Floats,
     used: Ints,
     shown: Ints,
-) -> BoxNoise:
-    """Fit the two parts of the noise to robust variances of edges, by the sides of their boxes."""
+) -> tuple[BoxNoise, float]:
+    """Fit the two parts of the noise to robust variances of edges, by the sides of their boxes.
+
+    Also return the correlation of opposite edges.
+    """
+    from scipy.optimize import nnls
+
     box, front = _core.project_to_boxes(
         _core.PoseModel.SE3, camera, poses[boxes.pose[used]], ellipsoids[shown[used]]
     )
     used, box = used[front], box[front]
     if len(used) < 50:
-        return BoxNoise()
+        return BoxNoise(), 0.0
     measured = boxes.box[used]
     error = (measured - box).ravel()
     side = np.tile(measured[:, 2:] - measured[:, :2], (1, 2)).ravel()
@@ -197,4 +224,8 @@ def _learn_noise(
     weight = 1.0 / (variance + 0.25)
     design = np.column_stack([np.ones(len(groups)), squares]) * weight[:, None]
     parts, _ = nnls(design, variance * weight)
-    return BoxNoise(pixels=max(float(np.sqrt(parts[0])), 0.5), relative=float(np.sqrt(parts[1])))
+    noise = BoxNoise(pixels=max(float(np.sqrt(parts[0])), 0.5), relative=float(np.sqrt(parts[1])))
+    sigma = np.sqrt(np.diagonal(noise.covariance(measured), axis1=1, axis2=2))
+    whitened = np.clip((measured - box) / sigma, -3.0, 3.0)
+    both = float(np.mean(whitened[:, :2] * whitened[:, 2:]) / np.mean(whitened**2))
+    return noise, float(np.clip(both, 0.0, 0.8))
