@@ -71,7 +71,7 @@ def change(room: rooms.Room, random: np.random.Generator) -> tuple[rooms.Room, d
 def _judged(
     one: dq.Change, truth: dict[str, set[int]], first: np.ndarray, second: np.ndarray
 ) -> list[tuple[str, str]]:
-    """Return what is true and what was found of an object, or of the two that were taken for one."""
+    """Return what is true and what was found of an object, or of two that were taken for one."""
     a = None if one.first_id is None else int(first[one.first_id])
     b = None if one.second_id is None else int(second[one.second_id])
     rows = {row for row in (a, b) if row is not None}

@@ -20,12 +20,13 @@ STAYS, MOVES, VANISHES, APPEARS = 0.7, 0.1, 0.1, 0.1
 # Error of a center that covariances do not show, as a share of the mean semi-axis, and meters.
 CENTER_SHARE, CENTER_M = 0.3, 0.01
 # Displacements of moved objects: sigma [m], and the share that is moved anywhere.
-MOVED_M, ANYWHERE = 0.8, 0.02
-# The share of objects that stay on what they stand on, and the sigmas of heights [m]: theirs, beside
-# the covariance, and that of the others.
+MOVED_M, ANYWHERE = 0.8, 0.005
+# The share of objects that stay on what they stand on, and the sigmas of heights [m]: theirs,
+# beside the covariance, and that of the others.
 ON_SURFACE, SURFACE_M, OTHER_SURFACE_M = 0.85, 0.03, 0.4
-# Spread of the logarithm of the size of an object between two maps, and between objects of a class.
-SIZE_SIGMA, CLASS_SIGMA = 0.15, 0.6
+# Spread of the logarithm of the size of an object between two maps, and between objects of a class,
+# which the maps' own objects show; the number of objects as which the assumed spread counts.
+SIZE_SIGMA, CLASS_SIGMA, CLASS_COUNT = 0.15, 0.4, 3.0
 # Probability of another class for the same object, if no boxes show how often that happens.
 CONFUSED = 0.02
 # Share of errors of stayed objects that are larger, and how many times.
@@ -126,9 +127,23 @@ def _log_same(first: SeenMap, second: SeenMap) -> tuple[Floats, Floats]:
     change = second.log_size[None, :, 0] - first.log_size[:, None, 0]
     variance = first.log_size[:, None, 1] ** 2 + second.log_size[None, :, 1] ** 2 + SIZE_SIGMA**2
     size = -0.5 * change**2 / variance - 0.5 * np.log(variance)
-    size -= -0.5 * change**2 / (variance + CLASS_SIGMA**2) - 0.5 * np.log(variance + CLASS_SIGMA**2)
+    # Two different objects of a class differ by its spread, twice.
+    other = variance + 2.0 * _class_variance(first, second)
+    size -= -0.5 * change**2 / other - 0.5 * np.log(other)
     labels = _log_class(first, second)
     return stay + size + labels, move + size + labels
+
+
+def _class_variance(first: SeenMap, second: SeenMap) -> float:
+    """Return the variance of the logarithms of sizes among the objects of a class, in one map."""
+    squares, free = CLASS_COUNT * CLASS_SIGMA**2, CLASS_COUNT
+    for one in (first, second):
+        names = np.array(one.class_names)
+        for name in sorted(set(one.class_names)):
+            own = one.log_size[names == name, 0]
+            squares += float(((own - own.mean()) ** 2).sum())
+            free += len(own) - 1
+    return squares / free
 
 
 def _log_displacement(difference: Floats, covariance: Floats, up: Floats | None) -> Floats:

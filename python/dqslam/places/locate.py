@@ -237,7 +237,10 @@ def _probabilities(places: Places) -> list[float]:
         return []
     every = np.append(places.log_odds, places.log_elsewhere)
     margin = every[0] - np.logaddexp.reduce(every[1:])
-    best = float(1.0 / (1.0 + np.exp(-CALIBRATED_OFFSET - CALIBRATED_SLOPE * margin)))
+    calibrated = float(1.0 / (1.0 + np.exp(-CALIBRATED_OFFSET - CALIBRATED_SLOPE * margin)))
+    # Of equal rivals, each has its share: the calibration is of answers that stand out.
+    share = float(np.exp(every[0] - np.logaddexp.reduce(every)))
+    best = max(calibrated, min(share, 0.5))
     others = np.exp(every[1:] - np.logaddexp.reduce(every[1:])) * (1.0 - best)
     return [best, *others[:-1].tolist()]
 
@@ -260,7 +263,8 @@ def _reason(
     if matches < FEWEST_MATCHES:
         return f"too few: {counted}, and {matches} show objects at the best pose"
     if best.probability < min_confidence:
-        if len(candidates) > 1 and candidates[1].probability > 0.5 * (1.0 - best.probability):
+        rivals = sum(one.probability for one in candidates[1:])
+        if rivals > 0.5 * (1.0 - best.probability):
             return (
                 f"ambiguous: {_at(best)} with probability {best.probability:.3f}, "
                 f"or {_at(candidates[1])} with {candidates[1].probability:.3f}"

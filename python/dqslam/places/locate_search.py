@@ -48,16 +48,21 @@ def find_places(place: PlaceMap, camera: _core.Camera, frames: list[Frame]) -> P
     """Find the places, none if no three boxes agree."""
     starts = [_starts(place, camera, frame) for frame in frames]
     poses = np.concatenate([np.zeros((0, 7)), *starts])
+    elsewhere = sum(frame.boxes.log_elsewhere for frame in frames)
+    if not len(poses):
+        none = np.zeros(0, dtype=np.int64)
+        matches = Matches(none, none, none, none)
+        return Places(poses, np.zeros(0), np.zeros((0, 6, 6)), matches, none, elsewhere)
     scorer = Scorer(place, camera, frames)
     scored = scorer.score(poses)
     for most in _MOST_REFINED:
         scored = scored.select(distinct(scored.poses, scored.score, place.sensor.sight, most))
         poses, _ = scorer.refine(scored)
         scored = scorer.score(poses)
-    return _weigh(place, scorer, scored)
+    return _weigh(place, scorer, scored, elsewhere)
 
 
-def _weigh(place: PlaceMap, scorer: Scorer, scored: Scored) -> Places:
+def _weigh(place: PlaceMap, scorer: Scorer, scored: Scored, elsewhere: float) -> Places:
     """Give different poses the integral of the probability around each (Laplace)."""
     from scipy.spatial.transform import Rotation
 
@@ -68,8 +73,6 @@ def _weigh(place: PlaceMap, scorer: Scorer, scored: Scored) -> Places:
         rotation = Rotation.from_quat(scored.poses[:, 3:]).as_matrix()
         prior += place.upright.log_prior(rotation)
     log_odds = scored.score + prior + 3.0 * np.log(2.0 * np.pi) - 0.5 * log_determinant
-    # The size of what a camera may see elsewhere is unknown, hence its prior that of a pose here.
-    elsewhere = sum(frame.boxes.log_elsewhere for frame in scorer.frames)
     sight = place.sensor.sight
     best = distinct(scored.poses, log_odds, sight, len(log_odds), _ONE_SHARE, _ONE_ANGLE)
     joined, covariance = _join(
