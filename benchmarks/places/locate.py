@@ -162,7 +162,7 @@ def locate_in_large_map(
     extent = float(np.sqrt(count))
     usual = np.exp(random.normal(np.log(0.15), 0.4, (classes, 3)))
     room = rooms.furnish(extent, usual, random.integers(0, classes, count), random)
-    place = dq.PlaceMap.of(rooms.map_room(room, 600, random, everything=True))
+    place = dq.PlaceMap.of(rooms.map_room(room, 60, random, everything=True))
     poses = rooms.draw_poses(room, images, random)
     boxes = rooms.detections_of(room, rooms.draw_boxes(room, poses, random))
     answers = Answers()

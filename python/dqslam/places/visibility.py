@@ -9,6 +9,11 @@ import numpy as np
 from dqslam import _core
 from dqslam._checks import Bools, Floats
 
+# Rows of a table that is made at once, at most.
+_MOST_ROWS = 500_000
+# Nothing smaller hides or is hidden, square pixels: no detector finds it.
+_LEAST_AREA_PX = 16.0
+
 
 @dataclass(frozen=True, eq=False)
 class Views:
@@ -39,6 +44,11 @@ def view_objects(
     """
     ellipsoids = np.broadcast_to(ellipsoids, (len(poses), *ellipsoids.shape[-2:]))
     n, o = ellipsoids.shape[:2]
+    if n > 1 and n * o > _MOST_ROWS:
+        halves = (slice(None, n // 2), slice(n // 2, None))
+        parts = [view_objects(camera, poses[part], ellipsoids[part], hides) for part in halves]
+        names = ("box", "in_image", "covered", "size", "distance")
+        return Views(*(np.concatenate([getattr(one, name) for one in parts]) for name in names))
     box, _ = _core.project_to_boxes(
         _core.PoseModel.SE3, camera, np.repeat(poses, o, axis=0), ellipsoids.reshape(-1, 9)
     )
@@ -66,8 +76,11 @@ def _covered(cut: Floats, area: Floats, behind: Floats, before: Floats) -> Float
 
     An object is nearer if its far side, ``behind``, is before the near side of the other.
     """
-    seen = area > 0.0
+    seen = area > _LEAST_AREA_PX
     most = int(seen.sum(axis=1).max(initial=0))
+    if len(cut) > 1 and len(cut) * most**2 > _MOST_ROWS:
+        parts = [slice(None, len(cut) // 2), slice(len(cut) // 2, None)]
+        return np.concatenate([_covered(cut[p], area[p], behind[p], before[p]) for p in parts])
     row = np.argsort(~seen, axis=1, kind="stable")[:, :most]  # those in the image first
     box = np.take_along_axis(cut, row[:, :, None], axis=1)
     own = np.where(np.take_along_axis(seen, row, axis=1), np.take_along_axis(area, row, 1), 1.0)
