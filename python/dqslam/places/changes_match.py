@@ -154,7 +154,7 @@ def _log_displacement(difference: Floats, covariance: Floats, up: Floats | None)
     """
     square = (difference**2).sum(axis=2)
     if up is None:
-        return -0.5 * square / MOVED_M**2 - 1.5 * np.log(2.0 * np.pi * MOVED_M**2)
+        return np.asarray(-0.5 * square / MOVED_M**2 - 1.5 * np.log(2.0 * np.pi * MOVED_M**2))
     rise, variance = difference @ up, np.einsum("abij,i,j->ab", covariance, up, up)
     along = -0.5 * (square - rise**2) / MOVED_M**2 - np.log(2.0 * np.pi * MOVED_M**2)
     parts = []
