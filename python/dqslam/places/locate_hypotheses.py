@@ -105,7 +105,8 @@ def find_hypotheses(pairings: Pairings, whole: Bools, upright: Upright | None) -
     boxes, counts = np.unique(pairings.box, return_counts=True)
     chosen = boxes[np.lexsort((counts, ~whole[boxes]))[:_MOST_BOXES]]
     pairs = _agreeing_pairs(pairings, np.flatnonzero(np.isin(pairings.box, chosen)))
-    found = [_resect(pairings, _triples(pairs, len(pairings)))]
+    triples = _supported(pairings, pairs, _triples(pairs, len(pairings)))
+    found = [_resect(pairings, triples)]
     if upright is not None and len(pairs) <= _MOST_TRIPLES:
         found.append(_stand(pairings, pairs, upright))
     return Hypotheses(
@@ -162,6 +163,17 @@ def _triples(pairs: Ints, count: int) -> Ints:
     place = np.minimum(np.searchsorted(known, wanted), max(len(known) - 1, 0))
     closed = known[place] == wanted if len(known) else np.zeros(0, dtype=bool)
     return np.asarray(np.column_stack([pairs[pair], third])[closed])
+
+
+def _supported(pairings: Pairings, pairs: Ints, triples: Ints) -> Ints:
+    """Keep the triples whose pairings agree with most other boxes, if there are very many."""
+    if len(triples) <= _MOST_TRIPLES:
+        return triples
+    agrees = np.zeros((len(pairings), int(pairings.box.max()) + 1), dtype=np.bool_)
+    for one, other in ((0, 1), (1, 0)):
+        agrees[pairs[:, one], pairings.box[pairs[:, other]]] = True
+    support = agrees.sum(axis=1)[triples].sum(axis=1)
+    return triples[np.argsort(-support, kind="stable")[:_MOST_TRIPLES]]
 
 
 def _resect(pairings: Pairings, triples: Ints) -> Hypotheses:
