@@ -92,6 +92,13 @@ if TYPE_CHECKING:  # the one list of public names, a line each: lazy_exports rea
     from dqslam.places import merge as merge
     from dqslam.places import merge_graphs as merge_graphs
     from dqslam.places import read_landmarks as read_landmarks
+    from dqslam.places.changes import Change as Change
+    from dqslam.places.changes import Changes as Changes
+    from dqslam.places.changes import changes as changes
+    from dqslam.places.locate import Candidate as Candidate
+    from dqslam.places.locate import Location as Location
+    from dqslam.places.locate import locate as locate
+    from dqslam.places.locate_map import PlaceMap as PlaceMap
     from dqslam.plot import plot_maps as plot_maps
     from dqslam.recording import AbsolutePositions as AbsolutePositions
     from dqslam.recording import Detections as Detections

@@ -81,7 +81,8 @@ def build_graph(
     ValueError
         If there are no boxes, if a box has no object id, if there are absolute positions, which
         ``solve_with_absolute_positions`` takes, if a relative position is of an object
-        without boxes or a size prior or a shape of a class without boxes, or if the core refuses the problem.
+        without boxes or a size prior or a shape of a class without boxes, or if the core refuses
+        the problem.
 
     Examples
     --------

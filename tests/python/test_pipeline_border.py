@@ -11,9 +11,9 @@ from dqslam.assumptions import BoxNoise, SizePrior
 from dqslam.estimate import Estimate
 from dqslam.graph import build_graph, solve
 from dqslam.io import load_recording
-from dqslam.lens import undistort_boxes
+from dqslam.lens import cut_edges, undistort_boxes
 from dqslam.pipeline import RunOptions, run
-from dqslam.pipeline.border import cut_edges, with_cut_edges
+from dqslam.pipeline.border import with_cut_edges
 from dqslam.pipeline.report import box_chi2, describe_boxes
 from orbit import CAMERA, NAMES, make_orbit, write_orbit
 from scenes import cut_by_the_border

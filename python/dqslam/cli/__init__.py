@@ -18,12 +18,14 @@ from dqslam._repr import printable
 from dqslam._version import version
 from dqslam.cli.ablation import ablation
 from dqslam.cli.align import align
+from dqslam.cli.changes import changes
 from dqslam.cli.convert import convert
 from dqslam.cli.degeneracy import degeneracy
 from dqslam.cli.demo import demo
 from dqslam.cli.detect import detect
 from dqslam.cli.evaluate import evaluate
 from dqslam.cli.inspect import inspect
+from dqslam.cli.locate import locate
 from dqslam.cli.merge import merge
 from dqslam.cli.paper import paper
 from dqslam.cli.plot import plot
@@ -37,7 +39,7 @@ from dqslam.cli.worlds import worlds
 COMMANDS: dict[str, tuple[Callable[..., None], ...]] = {
     "Start here": (demo, paper, simulate),
     "Your recording": (detect, inspect, convert, run, evaluate),
-    "Places": (align, merge),
+    "Places": (locate, changes, align, merge),
     "Look": (plot, view),
     "Study": (sweep, worlds, ablation, degeneracy),
 }

@@ -1,5 +1,6 @@
 """Lens models, and boxes through lenses."""
 
+from dqslam.lens.border import cut_edges as cut_edges
 from dqslam.lens.boxes import distort_boxes as distort_boxes
 from dqslam.lens.boxes import distorted_or_nan as distorted_or_nan
 from dqslam.lens.boxes import edge_scales as edge_scales

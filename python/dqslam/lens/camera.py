@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -114,7 +116,13 @@ def lens_of(camera: _core.Camera) -> Lens:
     """Return the lens of a camera, of whichever model."""
     if isinstance(camera, LensCamera):
         return camera.lens
-    return Lens("plumb_bob", tuple(camera.distortion.tolist()))
+    return _plumb_bob(*camera.distortion.tolist())
+
+
+@lru_cache(maxsize=64)
+def _plumb_bob(*parameters: float) -> Lens:
+    """Return the same lens for the same numbers: it keeps what it has worked out of them."""
+    return Lens("plumb_bob", parameters)
 
 
 def recorded_pixels(camera: _core.Camera, ideal: ArrayLike) -> Floats:

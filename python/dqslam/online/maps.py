@@ -14,16 +14,11 @@ from dqslam._checks import Floats
 from dqslam._ids import ObjectId, ObjectRow
 from dqslam.estimate import Estimate
 from dqslam.io import FileError, save_estimate
-from dqslam.io.results import load_map_results
+from dqslam.io.results import ellipsoid_covariances, load_map_results
 from dqslam.lens import camera_with, lens_of
 from dqslam.online.readout import read_estimate
 from dqslam.online.state import State
 from dqslam.recording import tangent_size
-
-# Sigmas of the center [m] and of the log axes if a result has none, as for a well measured object.
-UNKNOWN_CENTER_SIGMA_M, UNKNOWN_LOG_SIGMA = 0.05, 0.1
-# The sigma of an orientation [rad] if axes are equal, which do not determine it.
-MAX_ANGLE_SIGMA = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,9 +43,7 @@ class _Covariances:
 def load_map(directory: str | Path, robot_from_camera: ArrayLike | None = None) -> KnownMap:
     """Read the ellipsoids of a result, and their covariances.
 
-    A result has the covariance of the center and the sigmas of the log semi-axes. The uncertainty
-    of the orientation follows from these and the ratios of the axes. A result does not have the
-    mount of the camera, which is the identity by default.
+    A result does not have the mount of the camera, which is the identity by default.
     """
     results = load_map_results(directory)
     objects = results.objects
@@ -58,39 +51,13 @@ def load_map(directory: str | Path, robot_from_camera: ArrayLike | None = None) 
     is_of_no_steps = not len(results.timestamps) and not len(objects)
     if not rows.size and not is_of_no_steps:
         raise FileError(Path(directory) / "map.json", "has no ellipsoid")
-    covariances = np.zeros((len(rows), 9, 9))
-    for covariance, row in zip(covariances, rows, strict=True):
-        center, sigma = objects.center_covariances[row], objects.log_semi_axes_sigmas[row]
-        if not np.isfinite(center).all():
-            center = UNKNOWN_CENTER_SIGMA_M**2 * np.eye(3)
-        if not np.isfinite(sigma).all():
-            sigma = np.full(3, UNKNOWN_LOG_SIGMA)
-        covariance[:3, :3] = center
-        covariance[3:, 3:] = _shape_covariance(
-            objects.semi_axes[row], objects.orientations[row], sigma
-        )
     return KnownMap(
         camera=_with_mount(results.camera, robot_from_camera),
         object_ids=objects.object_ids[rows].tolist(),
         class_names=tuple(objects.class_names[row] for row in rows),
         ellipsoids=objects.ellipsoids[rows],
-        covariances=covariances,
+        covariances=ellipsoid_covariances(objects, rows),
     )
-
-
-def _shape_covariance(semi_axes: Floats, orientation_xyzw: Floats, log_sigma: Floats) -> Floats:
-    """Return the covariance of the log-Cholesky shape, (6, 6).
-
-    It is that of six independent changes: of the logarithms of the axes, and of the angles between
-    them. A rotation by an angle a in the plane of axes i and j changes log S by
-    (log s_i - log s_j) a. The sigma of an angle makes this change equal to the larger log sigma.
-    """
-    logs = np.log(semi_axes)
-    apart = np.abs(np.roll(logs, -1) - np.roll(logs, -2)) + 1e-3
-    wider = np.maximum(np.roll(log_sigma, -1), np.roll(log_sigma, -2))
-    sigma = np.concatenate([log_sigma, np.minimum(wider / apart, MAX_ANGLE_SIGMA)])
-    spread = _core.shape_from_axes_jacobian(semi_axes, orientation_xyzw) * sigma
-    return np.asarray(spread @ spread.T + 1e-10 * np.eye(6))
 
 
 def _with_mount(camera: _core.Camera, robot_from_camera: ArrayLike | None) -> _core.Camera:

@@ -19,4 +19,5 @@ from dqslam.io.results.load import Results as Results
 from dqslam.io.results.load import load_map_results as load_map_results
 from dqslam.io.results.load import load_results as load_results
 from dqslam.io.results.load import read_map as read_map
+from dqslam.io.results.map_covariances import ellipsoid_covariances as ellipsoid_covariances
 from dqslam.io.results.save import save_estimate as save_estimate

@@ -1,0 +1,103 @@
+"""``dqslam changes``: what has changed between two maps of one place."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from dqslam.cli.output import Json, Output, Quiet
+from dqslam.cli.settings import ConfigFile
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from dqslam.places.changes import Changes
+
+_STYLES = {"moved": "yellow", "vanished": "red", "appeared": "green", "unknown": "dim"}
+
+
+def changes(
+    first: Annotated[Path, typer.Argument(metavar="A", help="Directory of the map before.")],
+    second: Annotated[Path, typer.Argument(metavar="B", help="Directory of the map after.")],
+    b_from_a: Annotated[
+        Path | None,
+        typer.Option(
+            help="JSON file with b_from_a, 4 x 4, and covariance, 6 x 6, of the frames. Default: "
+            "both maps have one frame."
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR", help="Directory for changes.csv, changes.json and changes.png."
+        ),
+    ] = None,
+    config: ConfigFile = None,
+    quiet: Quiet = False,
+    json: Json = False,
+) -> None:
+    """Tell which objects stayed, moved, vanished or appeared, or that nobody looked.
+
+    Both maps need the boxes that `run` writes beside them: an object has vanished only if the
+    cameras of B looked at its place and should have found it. docs/locate.md describes the table.
+    """
+    from dqslam._outputs import output_set
+    from dqslam.cli.results import draw_figure
+    from dqslam.places.changes import changes as find_changes
+    from dqslam.places.changes_files import described, read_alignment, write_changes
+
+    output = Output(quiet=quiet, as_json=json)
+    pose, covariance = (None, None) if b_from_a is None else read_alignment(b_from_a)
+    with output.waiting("comparing"):
+        found = find_changes(first, second, second_from_first=pose, covariance=covariance)
+    why_not = ""
+    if out is not None:
+        with output_set(out, "dqslam changes", inputs=(first, second, b_from_a)) as folder:
+            write_changes(folder, found)
+
+            def draw(path: Path) -> None:
+                from dqslam.plot.changes import plot_changes
+
+                plot_changes(found, path)
+
+            why_not = draw_figure(output, folder / "changes.png", draw)
+    output.table(_table(found))
+    output.line(str(found))
+    if out is not None:
+        output.line(why_not or f"wrote {out}")
+    output.document(described(found))
+
+
+def _table(found: "Changes") -> "Table":
+    from rich.box import SIMPLE_HEAD
+    from rich.markup import escape
+    from rich.table import Table
+
+    from dqslam.places.changes_files import distance_and_sigma
+
+    table = Table(box=SIMPLE_HEAD)
+    for name in ("object", "class", "", "probability", "from [m]", "to [m]", "moved [m]", "looks"):
+        table.add_column(name, justify="left" if name in ("class", "") else "right")
+    for one in found.objects:
+        ids = " ".join(
+            f"{which}{number}"
+            for which, number in (("A", one.first_id), ("B", one.second_id))
+            if number is not None
+        )
+        distance, sigma = distance_and_sigma(one)
+        table.add_row(
+            ids,
+            escape(one.class_name),
+            one.status,
+            f"{one.probability:.3f}",
+            _place(one.first_center),
+            _place(one.second_center),
+            "" if distance != distance else f"{distance:.2f} ± {sigma:.2g}",
+            f"{one.looks:.1f}",
+            style=_STYLES.get(one.status),
+        )
+    return table
+
+
+def _place(center: object) -> str:
+    return "" if center is None else " ".join(f"{x:.2f}" for x in center)  # type: ignore[attr-defined]

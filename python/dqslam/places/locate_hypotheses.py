@@ -1,0 +1,279 @@
+"""Poses from which three boxes show three objects: the hypotheses of a search.
+
+The apparent size of an object of known size gives its distance. Two boxes then give the distance of
+two objects from each other, which the map knows: most wrong pairs contradict it. Three boxes whose
+pairs all agree give a pose, whose distances are corrected until those between the objects are the
+map's (the three-point problem of resection, with a start). Where the map shows which way is up, two
+boxes give two poses: those in which the camera is not tilted sideways.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dqslam import _core
+from dqslam._checks import Bools, Floats, Ints
+from dqslam.places.locate_map import ImageBoxes, PlaceMap
+from dqslam.places.locate_upright import Upright
+
+# The least probability of labels for an object among the hypotheses, relative to the best object.
+_LEAST_LABEL = 0.1
+# Boxes, at most, that hypotheses set out from.
+_MOST_BOXES = 10
+# Sigmas within which distances agree.
+_AGREE = 3.0
+# Relative error of a distance between objects, from their centers in the image and in the map, and
+# that of the middle of a box that the border cut.
+_DISTANCE_SIGMA, _CUT_SIGMA = 0.05, 0.15
+# Sigma of the logarithm of the distance by a box that the border cut.
+_CUT_SIZE_SIGMA = 0.4
+# Rounds of Newton's method for three distances, and the largest chi-square of these.
+_ROUNDS, _MOST_CHI2 = 4, 16.0
+# Triples, at most: the best of more are taken.
+_MOST_TRIPLES = 20_000
+# The least sine of the angle of a triple of objects: three in a line determine no pose.
+_LEAST_SINE = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class Pairings:
+    """Boxes with objects that they may show, one row each."""
+
+    box: Ints
+    object_row: Ints
+    ray: Floats
+    """Unit vectors to the middles of the boxes in the camera, shape (n, 3)."""
+    log_distance: Floats
+    """From the apparent size, shape (n,)."""
+    sigma: Floats
+    """Of that, shape (n,)."""
+    ray_sigma: Floats
+    """Relative error of a distance to another object by the error of the ray, shape (n,)."""
+    log_odds: Floats
+    """Of the labels, against a box that shows none; shape (n,)."""
+    center: Floats
+    """Of the objects, shape (n, 3)."""
+
+    def __len__(self) -> int:
+        """Return the number of pairings."""
+        return len(self.box)
+
+
+@dataclass(frozen=True, eq=False)
+class Hypotheses:
+    """Poses world_from_camera."""
+
+    rotation: Floats
+    """Shape (h, 3, 3)."""
+    position: Floats
+    """Shape (h, 3)."""
+
+
+def pair_up(place: PlaceMap, camera: _core.Camera, image: ImageBoxes) -> Pairings:
+    """List the objects that each box may show by its labels."""
+    focal, middle = np.array([camera.fx, camera.fy]), np.array([camera.cx, camera.cy])
+    side = image.box[:, 2:] - image.box[:, :2]
+    ray = np.column_stack(
+        [(0.5 * (image.box[:, :2] + image.box[:, 2:]) - middle) / focal, np.ones(len(side))]
+    )
+    ray /= np.linalg.norm(ray, axis=1, keepdims=True)
+    # A solid angle looks larger by the cube of the cosine at the border of a flat image.
+    log_half = 0.5 * np.log((0.5 * side / focal).prod(axis=1)) + 1.5 * np.log(ray[:, 2])
+    best = image.log_label.max(axis=1, keepdims=True)
+    box, row = np.nonzero(image.log_label > best + np.log(_LEAST_LABEL))
+    size = place.size[row]
+    cut = np.asarray(image.truncated.any(axis=1))[box]
+    return Pairings(
+        box=box,
+        object_row=row,
+        ray=ray[box],
+        log_distance=size[:, 0] - log_half[box],
+        sigma=np.where(cut, _CUT_SIZE_SIGMA, size[:, 1]),
+        ray_sigma=np.where(cut, _CUT_SIGMA, _DISTANCE_SIGMA),
+        log_odds=image.log_label[box, row],
+        center=place.ellipsoids[row, :3],
+    )
+
+
+def find_hypotheses(pairings: Pairings, whole: Bools, upright: Upright | None) -> Hypotheses:
+    """Find the poses of all pairs and triples that agree.
+
+    ``whole`` (b,) are the boxes without cut edges, which are preferred. Pairs need ``upright``.
+    """
+    boxes, counts = np.unique(pairings.box, return_counts=True)
+    chosen = boxes[np.lexsort((counts, ~whole[boxes]))[:_MOST_BOXES]]
+    pairs = _agreeing_pairs(pairings, np.flatnonzero(np.isin(pairings.box, chosen)))
+    triples = _supported(pairings, pairs, _triples(pairs, len(pairings)))
+    found = [_resect(pairings, triples)]
+    if upright is not None and len(pairs) <= _MOST_TRIPLES:
+        found.append(_stand(pairings, pairs, upright))
+    return Hypotheses(
+        np.concatenate([one.rotation for one in found]),
+        np.concatenate([one.position for one in found]),
+    )
+
+
+def _agreeing_pairs(pairings: Pairings, rows: Ints) -> Ints:
+    """Return pairs of pairings, the first of the lower box, whose distances agree, shape (p, 2)."""
+    from scipy.spatial import cKDTree
+
+    of_box = [rows[pairings.box[rows] == one] for one in np.unique(pairings.box[rows])]
+    trees = [cKDTree(pairings.center[one]) for one in of_box]
+    far = [np.exp((pairings.log_distance + _AGREE * pairings.sigma)[one].max()) for one in of_box]
+    found = [np.zeros((0, 2), dtype=np.int64)]
+    for a in range(len(of_box)):
+        for b in range(a + 1, len(of_box)):
+            near = trees[a].sparse_distance_matrix(trees[b], far[a] + far[b], output_type="ndarray")
+            i, j, distance = of_box[a][near["i"]], of_box[b][near["j"]], near["v"]
+            found.append(np.column_stack([i, j])[_agrees(pairings, i, j, distance)])
+    return np.concatenate(found)
+
+
+def _agrees(pairings: Pairings, i: Ints, j: Ints, distance: Floats) -> Bools:
+    """Tell whether objects are as far from each other as their boxes look, shape (p,)."""
+    near, far = np.exp(pairings.log_distance[i]), np.exp(pairings.log_distance[j])
+    cosine = (pairings.ray[i] * pairings.ray[j]).sum(axis=1)
+    square = near**2 + far**2 - 2.0 * near * far * cosine
+    seen = np.sqrt(np.maximum(square, 1e-12))
+    by_near = near * (near - far * cosine) / seen * pairings.sigma[i]
+    by_far = far * (far - near * cosine) / seen * pairings.sigma[j]
+    by_ray = 0.5 * (near + far) * np.maximum(pairings.ray_sigma[i], pairings.ray_sigma[j])
+    sigma = np.sqrt(by_near**2 + by_far**2 + by_ray**2)
+    other = pairings.object_row[i] != pairings.object_row[j]
+    return np.asarray(other & (np.abs(seen - distance) < _AGREE * sigma))
+
+
+def _triples(pairs: Ints, count: int) -> Ints:
+    """Return the triangles in the graph of agreeing pairs, shape (t, 3)."""
+    pairs = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
+    first = np.searchsorted(pairs[:, 0], np.arange(count + 1))
+    onward = first[pairs[:, 1] + 1] - first[pairs[:, 1]]  # pairs that begin where each ends
+    if onward.sum() > 50 * _MOST_TRIPLES:  # keep those whose ends have the most neighbors
+        degree = np.bincount(pairs.ravel(), minlength=count)
+        best = np.argsort(-degree[pairs].min(axis=1), kind="stable")
+        keep = best[np.cumsum(onward[best]) <= 50 * _MOST_TRIPLES]
+        return _triples(pairs[keep], count)
+    pair = np.repeat(np.arange(len(pairs)), onward)
+    step = np.arange(len(pair)) - np.repeat(np.cumsum(onward) - onward, onward)
+    third = pairs[first[pairs[pair, 1]] + step, 1]
+    known = pairs[:, 0] * count + pairs[:, 1]
+    wanted = pairs[pair, 0] * count + third
+    place = np.minimum(np.searchsorted(known, wanted), max(len(known) - 1, 0))
+    closed = known[place] == wanted if len(known) else np.zeros(0, dtype=bool)
+    return np.asarray(np.column_stack([pairs[pair], third])[closed])
+
+
+def _supported(pairings: Pairings, pairs: Ints, triples: Ints) -> Ints:
+    """Keep the triples whose pairings agree with most other boxes, if there are very many."""
+    if len(triples) <= _MOST_TRIPLES:
+        return triples
+    agrees = np.zeros((len(pairings), int(pairings.box.max()) + 1), dtype=np.bool_)
+    for one, other in ((0, 1), (1, 0)):
+        agrees[pairs[:, one], pairings.box[pairs[:, other]]] = True
+    support = agrees.sum(axis=1)[triples].sum(axis=1)
+    return triples[np.argsort(-support, kind="stable")[:_MOST_TRIPLES]]
+
+
+def _resect(pairings: Pairings, triples: Ints) -> Hypotheses:
+    """Return the poses of triples (t, 3) whose objects are not in a line and fit their boxes."""
+    different = pairings.object_row[triples]
+    triples = triples[(different[:, 0] != different[:, 2])]
+    world, ray = pairings.center[triples], pairings.ray[triples]
+    one, two = world[:, 1] - world[:, 0], world[:, 2] - world[:, 0]
+    lengths = np.linalg.norm(one, axis=1) * np.linalg.norm(two, axis=1)
+    bent = np.linalg.norm(np.cross(one, two), axis=1) > _LEAST_SINE * lengths
+    triples, world, ray = triples[bent], world[bent], ray[bent]
+    log_distance, chi2 = _solve_distances(pairings, triples)
+    fits = np.flatnonzero(chi2 < _MOST_CHI2)
+    if len(fits) > _MOST_TRIPLES:
+        fits = fits[np.argsort(chi2[fits], kind="stable")[:_MOST_TRIPLES]]
+    camera = ray[fits] * np.exp(log_distance[fits])[:, :, None]
+    world = world[fits]
+    rotation = np.asarray(_frames(world) @ _frames(camera).transpose(0, 2, 1))
+    middle = np.einsum("tij,tj->ti", rotation, camera.mean(axis=1))
+    return Hypotheses(rotation, world.mean(axis=1) - middle)
+
+
+def _stand(pairings: Pairings, pairs: Ints, upright: Upright) -> Hypotheses:
+    """Return the poses of pairs (p, 2) in which the camera's x axis is horizontal."""
+    log_distance, chi2 = _solve_distances(pairings, pairs)
+    fits = chi2 < _MOST_CHI2
+    world = pairings.center[pairs[fits]]
+    camera = pairings.ray[pairs[fits]] * np.exp(log_distance[fits])[:, :, None]
+    # The first axis of these frames joins both objects. A turn about it is open.
+    to_world, to_camera = _axis_frames(world), _axis_frames(camera)
+    up, x = upright.up @ to_world, to_camera[:, 0, :]
+    # x . R^T up = a + b cos + c sin = 0 of the angle of the turn
+    a = up[:, 0] * x[:, 0]
+    b = up[:, 1] * x[:, 1] + up[:, 2] * x[:, 2]
+    c = up[:, 2] * x[:, 1] - up[:, 1] * x[:, 2]
+    reach = np.hypot(b, c)
+    half = np.arccos(np.clip(-a / np.maximum(reach, 1e-12), -1.0, 1.0))
+    rotations, positions = [], []
+    for sign in (1.0, -1.0):
+        angle = np.arctan2(c, b) + sign * half
+        turn = np.zeros((len(angle), 3, 3))
+        turn[:, 0, 0] = 1.0
+        turn[:, 1, 1] = turn[:, 2, 2] = np.cos(angle)
+        turn[:, 2, 1], turn[:, 1, 2] = np.sin(angle), -np.sin(angle)
+        rotation = to_world @ turn @ to_camera.transpose(0, 2, 1)
+        is_up = upright.up @ rotation[:, :, 1].T < 0.0
+        rotations.append(rotation[is_up])
+        middle = np.einsum("tij,tj->ti", rotation, camera.mean(axis=1))
+        positions.append((world.mean(axis=1) - middle)[is_up])
+    return Hypotheses(np.concatenate(rotations), np.concatenate(positions))
+
+
+def _solve_distances(pairings: Pairings, groups: Ints) -> tuple[Floats, Floats]:
+    """Find the distances whose differences are the map's, near those of the apparent sizes.
+
+    The groups (t, k) are pairs or triples. Return the logarithms of the distances (t, k) and the
+    chi-square of each group (t,).
+    """
+    start, sigma = pairings.log_distance[groups], pairings.sigma[groups]
+    ray, world, blur = pairings.ray[groups], pairings.center[groups], pairings.ray_sigma[groups]
+    first, second = np.triu_indices(groups.shape[1], 1)
+    cosine = (ray[:, first] * ray[:, second]).sum(axis=2)
+    known = np.linalg.norm(world[:, first] - world[:, second], axis=2)
+    relative = 0.5 * np.maximum(blur[:, first], blur[:, second])
+    log_distance = start.copy()
+    for last in [False] * _ROUNDS + [True]:
+        distance = np.exp(log_distance)
+        a, b = distance[:, first], distance[:, second]
+        seen = np.sqrt(np.maximum(a**2 + b**2 - 2.0 * a * b * cosine, 1e-12))
+        scale = relative * (a + b)
+        error = (seen - known) / scale
+        prior = (log_distance - start) / sigma
+        if last:
+            break
+        jacobian = np.zeros((*error.shape, groups.shape[1]))
+        row = np.arange(len(first))
+        jacobian[:, row, first] = a * (a - b * cosine) / seen / scale
+        jacobian[:, row, second] = b * (b - a * cosine) / seen / scale
+        transposed = jacobian.transpose(0, 2, 1)
+        hessian = transposed @ jacobian + np.eye(groups.shape[1]) / sigma[:, :, None] ** 2
+        gradient = (transposed @ error[:, :, None])[:, :, 0] + prior / sigma
+        step = np.linalg.solve(hessian, gradient[:, :, None])[:, :, 0]
+        log_distance = log_distance - np.clip(step, -0.5, 0.5)
+    return log_distance, np.asarray((error**2).sum(axis=1) + (prior**2).sum(axis=1))
+
+
+def _axis_frames(points: Floats) -> Floats:
+    """Return a right-handed frame for each pair (p, 2, 3), whose x axis joins the points."""
+    x = points[:, 1] - points[:, 0]
+    x = x / np.linalg.norm(x, axis=1, keepdims=True)
+    across = np.eye(3)[np.abs(x).argmin(axis=1)]
+    z = np.cross(x, across)
+    z = z / np.linalg.norm(z, axis=1, keepdims=True)
+    return np.stack([x, np.cross(z, x), z], axis=2)
+
+
+def _frames(points: Floats) -> Floats:
+    """Return the axes of a right-handed frame of each triangle (t, 3, 3) in columns."""
+    x = points[:, 1] - points[:, 0]
+    z = np.cross(x, points[:, 2] - points[:, 0])
+    x = x / np.linalg.norm(x, axis=1, keepdims=True)
+    z = z / np.maximum(np.linalg.norm(z, axis=1, keepdims=True), 1e-12)
+    return np.stack([x, np.cross(z, x), z], axis=2)

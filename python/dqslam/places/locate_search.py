@@ -1,0 +1,204 @@
+"""The search for the poses that explain the boxes of images, and their probabilities."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dqslam import _core
+from dqslam._checks import Bools, Floats, Ints
+from dqslam.places.locate_hypotheses import Hypotheses, Pairings, find_hypotheses, pair_up
+from dqslam.places.locate_map import ImageBoxes, PlaceMap
+from dqslam.places.locate_score import SE3, Frame, Matches, Scored, Scorer
+
+# Hypotheses of each image that are compared with its boxes quickly, and scored.
+_MOST_QUICK, _MOST_SCORED = 4000, 24
+# Hypotheses that each round of assignment and refinement continues with.
+_MOST_REFINED = (24, 8, 8)
+# Sigma of the direction of a box's middle: constant [rad], and a share of its half side.
+_RAY_SIGMA, _RAY_SHARE = 0.015, 0.25
+# Poses as near as this lead to the same: a share of the sight, and radians.
+_SAME_SHARE, _SAME_ANGLE = 0.03, 0.1
+# Poses as near as this are one answer.
+_ONE_SHARE, _ONE_ANGLE = 0.12, 0.25
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Different poses that explain the boxes, best first."""
+
+    poses: Floats
+    """world_from_camera of the reference image, shape (p, 7)."""
+    log_odds: Floats
+    """Logarithm of the probability of each, against an image that shows none of the objects here.
+
+    Shape (p,).
+    """
+    covariance: Floats
+    """In the tangents of the poses, shape (p, 6, 6)."""
+    matches: Matches
+    missing: Ints
+    """Objects that each expects in vain, shape (p,)."""
+    log_elsewhere: float
+    """Likewise of another place."""
+
+
+def find_places(place: PlaceMap, camera: _core.Camera, frames: list[Frame]) -> Places:
+    """Find the places, none if no three boxes agree."""
+    starts = [_starts(place, camera, frame) for frame in frames]
+    poses = np.concatenate([np.zeros((0, 7)), *starts])
+    elsewhere = sum(frame.boxes.log_elsewhere for frame in frames)
+    if not len(poses):
+        none = np.zeros(0, dtype=np.int64)
+        matches = Matches(none, none, none, none)
+        return Places(poses, np.zeros(0), np.zeros((0, 6, 6)), matches, none, elsewhere)
+    scorer = Scorer(place, camera, frames)
+    scored = scorer.score(poses)
+    for most in _MOST_REFINED:
+        scored = scored.select(distinct(scored.poses, scored.score, place.sensor.sight, most))
+        poses, _ = scorer.refine(scored)
+        scored = scorer.score(poses)
+    return _weigh(place, scorer, scored, elsewhere)
+
+
+def _weigh(place: PlaceMap, scorer: Scorer, scored: Scored, elsewhere: float) -> Places:
+    """Give different poses the integral of the probability around each (Laplace)."""
+    from scipy.spatial.transform import Rotation
+
+    _, information, _ = scorer.linearize(scored.poses, scored.matches)
+    _, log_determinant = np.linalg.slogdet(information)
+    prior = np.full(len(scored.poses), -np.log(place.volume * 8.0 * np.pi**2))
+    if place.upright is not None:
+        rotation = Rotation.from_quat(scored.poses[:, 3:]).as_matrix()
+        prior += place.upright.log_prior(rotation)
+    log_odds = scored.score + prior + 3.0 * np.log(2.0 * np.pi) - 0.5 * log_determinant
+    sight = place.sensor.sight
+    best = distinct(scored.poses, log_odds, sight, len(log_odds), _ONE_SHARE, _ONE_ANGLE)
+    joined, covariance = _join(
+        scored.poses,
+        log_odds,
+        np.asarray(np.linalg.inv(information), dtype=np.float64),
+        best,
+        sight,
+    )
+    order = np.argsort(-joined, kind="stable")
+    chosen = scored.select(best[order])
+    return Places(
+        chosen.poses, joined[order], covariance[order], chosen.matches, chosen.missing, elsewhere
+    )
+
+
+def _join(
+    poses: Floats, log_odds: Floats, covariance: Floats, best: Ints, sight: float
+) -> tuple[Floats, Floats]:
+    """Add the poses that are near each of the best to it: log-odds (p,), covariances (p, 6, 6).
+
+    Another assignment of a box moves a pose a little, and is no other answer.
+    """
+    left = np.isfinite(log_odds)
+    joined, spread = np.zeros(len(best)), np.zeros((len(best), 6, 6))
+    for place, row in enumerate(best.tolist()):
+        own = left & _near(poses, poses[[row]], sight, _ONE_SHARE, _ONE_ANGLE)[:, 0]
+        left &= ~own
+        joined[place] = np.logaddexp.reduce(log_odds[own])
+        share = np.exp(log_odds[own] - joined[place])
+        apart = _core.minus(SE3, poses[own], np.tile(poses[row], (int(own.sum()), 1)))
+        outer = apart[:, :, None] * apart[:, None, :]
+        spread[place] = np.einsum("k,kij->ij", share, covariance[own] + outer)
+    return joined, spread
+
+
+def _near(a: Floats, b: Floats, sight: float, share: float, angle: float) -> Bools:
+    """Tell which poses (n, 7) and (m, 7) are nearer than a share of the sight and an angle."""
+    apart = np.linalg.norm(a[:, None, :3] - b[None, :, :3], axis=2)
+    same_half = np.abs(a[:, 3:] @ b[:, 3:].T)  # the cosine of half the angle
+    return np.asarray((apart < share * sight) & (same_half > np.cos(0.5 * angle)))
+
+
+def distinct(
+    poses: Floats,
+    score: Floats,
+    sight: float,
+    most: int,
+    share: float = _SAME_SHARE,
+    angle: float = _SAME_ANGLE,
+) -> Ints:
+    """Return the rows of the best poses, best first, no two of which are near each other."""
+    order = np.argsort(-score, kind="stable")
+    order = order[np.isfinite(score[order])]
+    same = _near(poses[order], poses[order], sight, share, angle)
+    left = np.ones(len(order), dtype=np.bool_)
+    chosen: list[int] = []
+    for row in range(len(order)):
+        if left[row] and len(chosen) < most:
+            chosen.append(row)
+            left &= ~same[row]
+    return order[np.array(chosen, dtype=np.int64)]
+
+
+def _starts(place: PlaceMap, camera: _core.Camera, frame: Frame) -> Floats:
+    """Return the best hypotheses of an image as poses of the reference image, shape (h, 7)."""
+    from scipy.spatial.transform import Rotation
+
+    image = frame.boxes
+    pairings = pair_up(place, camera, image)
+    whole = np.asarray(~image.truncated.any(axis=1))
+    found = _strongest(find_hypotheses(pairings, whole, place.upright), place.sensor.sight)
+    score = _quick_score(place, image, pairings, found)
+    if place.upright is not None:
+        score += place.upright.log_prior(found.rotation)
+    best = np.argsort(-score, kind="stable")[: 4 * _MOST_SCORED]
+    quaternion = Rotation.from_matrix(found.rotation[best]).as_quat() if len(best) else []
+    poses = np.column_stack([found.position[best], np.reshape(quaternion, (-1, 4))])
+    poses = poses[distinct(poses, score[best], place.sensor.sight, _MOST_SCORED)]
+    back = _core.inverse(SE3, frame.reference_from_image[None])
+    return _core.compose(SE3, poses, np.tile(back, (len(poses), 1)))
+
+
+def _strongest(found: Hypotheses, sight: float) -> Hypotheses:
+    """Return the hypotheses that most others are near to, if there are very many."""
+    from scipy.spatial import cKDTree
+
+    count = len(found.position)
+    if count <= _MOST_QUICK:
+        return found
+    where = np.hstack(
+        [found.position / (0.1 * sight), found.rotation[:, :, 0] * 5, found.rotation[:, :, 2] * 5]
+    )
+    near = cKDTree(where).query_ball_point(where, 1.0, return_length=True)
+    keep = np.argsort(-near, kind="stable")[:_MOST_QUICK]
+    return Hypotheses(found.rotation[keep], found.position[keep])
+
+
+def _quick_score(
+    place: PlaceMap, image: ImageBoxes, pairings: Pairings, found: Hypotheses
+) -> Floats:
+    """Score hypotheses by directions and distances of the objects that boxes may show, (h,)."""
+    if not len(found.position):
+        return np.zeros(0)
+    variance = np.diagonal(image.covariance, axis1=1, axis2=2)
+    free = ~image.truncated
+    peak = -0.5 * np.where(free, np.log(2.0 * np.pi * variance), 0.0).sum(axis=1)
+    gain = pairings.log_odds + (peak - image.log_false)[pairings.box]
+    useful: Bools = gain > 0.0
+    box, ray, center = pairings.box[useful], pairings.ray[useful], pairings.center[useful]
+    if not len(box):
+        return np.zeros(len(found.position))
+    half = np.exp(place.size[pairings.object_row[useful], 0] - pairings.log_distance[useful])
+    sigma_ray = np.hypot(_RAY_SIGMA, _RAY_SHARE * half)
+    first = np.flatnonzero(np.concatenate([[True], box[1:] != box[:-1]]))
+    score = np.zeros(len(found.position))
+    chunk = max(1, 300_000 // len(box))
+    for start in range(0, len(score), chunk):
+        part = slice(start, start + chunk)
+        rotation, position = found.rotation[part], found.position[part]
+        offset = np.einsum("hi,hij->hj", position, rotation)
+        inside = np.einsum("ni,hij->hnj", center, rotation) - offset[:, None, :]
+        distance = np.sqrt((inside**2).sum(axis=2))
+        cosine = (inside * ray).sum(axis=2) / distance
+        error = 2.0 * (1.0 - cosine) / sigma_ray**2
+        error += ((np.log(distance) - pairings.log_distance[useful]) / pairings.sigma[useful]) ** 2
+        own = np.maximum(gain[useful] - 0.5 * error, 0.0)
+        score[part] = np.maximum.reduceat(own, first, axis=1).sum(axis=1)
+    return score

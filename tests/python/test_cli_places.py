@@ -1,0 +1,87 @@
+"""``dqslam locate`` and ``dqslam changes`` on files."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+from dqslam.cli import main
+from orbit import CAMERA
+from small_place import CENTERS, NAMES, boxes_at, pose_at, write_map
+
+POSES = [pose_at(1.3, -2.2, 0.9), pose_at(-2.0, 1.0, 1.3)]
+
+
+@pytest.fixture
+def files(tmp_path):
+    """Write a map, a camera, and boxes of two images and of one that shows too little."""
+    write_map(tmp_path / "map")
+    (tmp_path / "camera.json").write_text(json.dumps(CAMERA))
+    lines = ["timestamp,x1,y1,x2,y2,score,class_id,class_name"]
+    kinds = sorted(set(NAMES))
+    for time, pose in enumerate([*POSES, POSES[0]]):
+        for row, box in enumerate(boxes_at(pose)[: 2 if time == 2 else None]):
+            edges = ",".join(f"{x:.6f}" for x in box)
+            lines.append(f"{time},{edges},0.9,{kinds.index(NAMES[row])},{NAMES[row]}")
+    (tmp_path / "boxes.csv").write_text("\n".join(lines) + "\n")
+    return tmp_path
+
+
+def arguments(files, *more):
+    names = {"--camera": "camera.json", "--detections": "boxes.csv"}
+    given = [part for key, name in names.items() for part in (key, str(files / name))]
+    return ["locate", str(files / "map"), *given, *map(str, more)]
+
+
+def test_locate_writes_a_row_for_each_image(files, capsys):
+    assert main(arguments(files, "--out", files / "out", "--json")) == 0
+    printed = json.loads(capsys.readouterr().out)
+    with (files / "out" / "locations.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [float(row["timestamp"]) for row in rows] == [0.0, 1.0, 2.0]
+    for row, pose in zip(rows, POSES, strict=False):
+        found = [float(row[name]) for name in ("x", "y", "z")]
+        np.testing.assert_allclose(found, pose[:3], atol=1e-3)
+        assert float(row["confidence"]) > 0.99
+    assert rows[2]["x"] == ""
+    assert rows[2]["reason"].startswith("too few: 2 of 2 boxes")
+    assert [one["found"] for one in printed["images"]] == [True, True, False]
+    assert np.shape(printed["images"][0]["candidates"][0]["covariance"]) == (6, 6)
+
+
+def test_locate_prints_why_there_is_no_answer(files, capsys):
+    assert main(arguments(files)) == 0
+    text = capsys.readouterr().out
+    assert "2 of 3 located" in text
+    assert "too few" in text
+
+
+def test_locate_refuses_what_is_no_map(files, capsys):
+    (files / "map" / "map.json").write_text('{"objects": []}')
+    assert main(arguments(files)) == 2
+    assert "map.json: has no ellipsoid" in capsys.readouterr().err
+
+
+def test_changes_writes_a_table_and_a_figure(files, capsys):
+    centers = CENTERS.copy()
+    centers[3] += [0.4, -0.3, 0.0]
+    after = write_map(files / "after", centers)
+    out = files / "changes"
+    assert main(["changes", str(files / "map"), str(after), "--out", str(out), "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    with (out / "changes.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [row["status"] for row in rows].count("stayed") == len(NAMES) - 1
+    assert rows[3]["status"] == "moved"
+    assert float(rows[3]["distance"]) == pytest.approx(0.5, abs=0.02)
+    assert printed["objects"][3]["second_center"] == pytest.approx(centers[3].tolist())
+    assert (out / "changes.png").stat().st_size > 10_000
+
+
+def test_changes_refuses_a_file_without_a_motion(files, capsys):
+    path = files / "alignment.json"
+    path.write_text("{}")
+    folder = str(files / "map")
+    assert main(["changes", folder, folder, "--b-from-a", str(path)]) == 2
+    assert "alignment.json: has no b_from_a" in capsys.readouterr().err
