@@ -8,6 +8,7 @@
 #include "dqslam/geometry/camera.h"
 #include "dqslam/geometry/ellipsoid.h"
 #include "dqslam/geometry/pose.h"
+#include "dqslam/geometry/shape.h"
 #include "dqslam/online/observations.h"
 #include "dqslam/online/options.h"
 #include "dqslam/online/relocalize.h"

@@ -6,13 +6,23 @@ from dataclasses import dataclass
 import numpy as np
 
 from dqslam import _core
-from dqslam._checks import Bools, Floats, Ints, as_floats, reject_rows, require
+from dqslam._checks import Bools, Floats, Ints, as_floats, require
 from dqslam._repr import counted
 from dqslam.assumptions import BoxNoise, SizePrior, SizePriors
 from dqslam.coincidence import contradicted_objects
 from dqslam.estimate import Estimate
+from dqslam.layout import (
+    class_names_of,
+    flat,
+    measurement_table,
+    measurements_of,
+    objects_of,
+    odometry_table,
+    shapes_of,
+    size_priors_of,
+)
 from dqslam.lens import Lens, LensCamera, camera_with
-from dqslam.recording import Detections, LoopClosures, Measurements, Odometry, Recording
+from dqslam.recording import Recording
 
 # Where at least this share of all boxes fit, no box is suspected to show something else.
 TRUSTED_SHARE = 0.99
@@ -97,30 +107,30 @@ def build_graph(
         raise ValueError("absolute: solve_with_absolute_positions(graph, absolute) takes them")
     box_noise = BoxNoise() if box_noise is None else box_noise
     odometry, detections = recording.odometry, recording.detections
-    object_ids, box_object, observations = _objects(detections)
-    class_names = _class_names(detections, box_object, len(object_ids))
-    priors = _size_priors(size_prior, class_names, detections)
+    object_ids, box_object, observations = objects_of(detections)
+    class_names = class_names_of(detections, box_object, len(object_ids))
+    priors = size_priors_of(size_prior, class_names, detections)
     core = _core.Graph(
         odometry.pose_model,
         recording.camera,
         initial_poses=_core.dead_reckon(
             odometry.pose_model, odometry.first_pose, odometry.relative
         ),
-        odometry=_odometry_table(odometry, recording.closures),
+        odometry=odometry_table(odometry, recording.closures),
         boxes=_core.BoxTable(
             pose=detections.pose,
             object=box_object,
             box=detections.box,
-            covariance=_flat(box_noise.covariance(detections.box, recording.camera)),
+            covariance=flat(box_noise.covariance(detections.box, recording.camera)),
             truncated=detections.truncated,
         ),
         size_prior=_core.SizePriorTable(
             log_mean=np.array([prior.log_mean for prior in priors]),
             log_sigma=np.array([prior.log_sigma for prior in priors]),
         ),
-        measurements=[_table(each, object_ids) for each in _measurements(recording)],
+        measurements=[measurement_table(each, object_ids) for each in measurements_of(recording)],
         scene_priors=_core.ScenePriors() if scene_priors is None else scene_priors,
-        shapes=_shapes(shapes, class_names, detections),
+        shapes=shapes_of(shapes, class_names, detections),
     )
     return Graph(
         core=core,
@@ -260,111 +270,6 @@ def _inlier_views(core: _core.Graph, inliers: Bools) -> Ints:
     pairs = np.column_stack([core.boxes.object, core.boxes.pose])[inliers]
     seen = np.unique(pairs, axis=0)
     return np.bincount(seen[:, 0], minlength=core.num_objects)
-
-
-def _size_priors(
-    given: SizePrior | SizePriors | None, class_names: tuple[str, ...], detections: Detections
-) -> list[SizePrior]:
-    """Return the prior of each object, for their class names (o,)."""
-    if isinstance(given, SizePriors):
-        given.check_classes(set(detections.class_names.values()))
-        return [given.of(name) for name in class_names]
-    return [SizePrior() if given is None else given] * len(class_names)
-
-
-def _shapes(
-    given: _core.Shape | Mapping[str, _core.Shape] | None,
-    class_names: tuple[str, ...],
-    detections: Detections,
-) -> list[_core.Shape]:
-    """Return the shape of each object, for their class names (o,); none if all are ellipsoids."""
-    if given is None:
-        return []
-    if isinstance(given, _core.Shape):
-        return [given] * len(class_names)
-    for name in given:
-        if name not in detections.class_names.values():
-            names = ", ".join(sorted(set(detections.class_names.values())))
-            raise ValueError(f"shapes: no class {name!r} in the recording, only: {names}")
-    return [given.get(name, _core.Shape.ELLIPSOID) for name in class_names]
-
-
-def _odometry_table(odometry: Odometry, closures: LoopClosures | None) -> _core.OdometryTable:
-    """Lay out the steps, then the closures, which the core has as odometry back in time."""
-    model, steps = odometry.pose_model, np.arange(len(odometry.relative))
-    tables = [(steps, steps + 1, odometry.relative, odometry.covariance)]
-    if closures is not None:
-        first, second = closures.from_pose, closures.to_pose
-        ahead = first < second
-        # The inverse of to_in_from has its error in the frame of the first pose.
-        adjoint = _core.adjoint(model, closures.relative)
-        moved = adjoint @ closures.covariance @ adjoint.transpose(0, 2, 1)
-        tables.append(
-            (
-                np.where(ahead, second, first),
-                np.where(ahead, first, second),
-                np.where(
-                    ahead[:, None], _core.inverse(model, closures.relative), closures.relative
-                ),
-                np.where(ahead[:, None, None], moved, closures.covariance),
-            )
-        )
-    from_pose, to_pose, relative, covariance = map(np.concatenate, zip(*tables, strict=True))
-    return _core.OdometryTable(
-        from_pose=from_pose, to_pose=to_pose, relative=relative, covariance=_flat(covariance)
-    )
-
-
-def _objects(detections: Detections) -> tuple[Ints, Ints, Ints]:
-    """Return the object ids (o,), the row of each box's object (b,), and boxes per object (o,)."""
-    if not len(detections):
-        raise ValueError("detections: there are no boxes")
-    unknown = detections.object_id < 0
-    reject_rows("detections.object_id", unknown, "the box belongs to no object yet")
-    object_ids, box_object, observations = np.unique(
-        detections.object_id, return_inverse=True, return_counts=True
-    )
-    return object_ids, box_object.reshape(-1), observations
-
-
-def _class_names(detections: Detections, box_object: Ints, objects: int) -> tuple[str, ...]:
-    classes, box_class = np.unique(detections.class_id, return_inverse=True)
-    votes = np.zeros((objects, len(classes)), dtype=np.int64)
-    np.add.at(votes, (box_object, box_class.reshape(-1)), 1)
-    return tuple(detections.class_names[int(classes[row])] for row in votes.argmax(axis=1))
-
-
-def _measurements(recording: Recording) -> list[Measurements]:
-    """Return the measurements other than boxes, positions first."""
-    positions = recording.positions
-    if positions is None:
-        return list(recording.measurements)
-    of_centers = Measurements(
-        "position",
-        positions.pose,
-        positions.object_id,
-        positions.object_in_robot,
-        positions.covariance,
-    )
-    return [of_centers, *recording.measurements]
-
-
-def _table(measured: Measurements, object_ids: Ints) -> _core.MeasurementTable:
-    has_no_box = ~np.isin(measured.object_id, object_ids)
-    name = f"{measured.kind}s.object_id"
-    reject_rows(name, has_no_box, "the object has no box", measured.object_id)
-    return _core.MeasurementTable(
-        kind=measured.kind,
-        pose=measured.pose,
-        object=np.searchsorted(object_ids, measured.object_id),
-        value=measured.value,
-        covariance=_flat(measured.covariance),
-    )
-
-
-def _flat(covariance: Floats) -> Floats:
-    """Lay out matrices (m, k, k) as rows (m, k * k)."""
-    return covariance.reshape(len(covariance), covariance.shape[1] ** 2)
 
 
 def _ellipsoid_or_nan(dual_quadric: Floats) -> Floats:

@@ -6,25 +6,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dqslam._input import refuse_shared_input
-from dqslam.cli.options import (
-    BoxForm,
-    BoxImage,
-    CameraFile,
-    CameraId,
-    DetectionFile,
-    FirstFrame,
-    Formats,
-    FrameRate,
-    FrameTimesFile,
-    ImageSize,
-    Letterbox,
-    MaxBad,
-    Nms,
-    given_frame_times,
-    given_reading,
-    given_readings,
-)
+from dqslam.cli.groups import with_groups
 from dqslam.cli.output import Json, Output, Quiet
+from dqslam.cli.reading import ImageOptions
 from dqslam.cli.settings import ConfigFile
 
 if TYPE_CHECKING:
@@ -35,10 +19,10 @@ if TYPE_CHECKING:
 MOST_LISTED = 40
 
 
+@with_groups
 def locate(
     known: Annotated[Path, typer.Argument(metavar="MAP", help="Directory that `run` wrote.")],
-    camera: CameraFile,
-    detections: DetectionFile,
+    files: ImageOptions,
     odometry: Annotated[
         Path | None,
         typer.Option(
@@ -56,17 +40,6 @@ def locate(
     min_confidence: Annotated[
         float, typer.Option(help="The least probability of an answer.")
     ] = 0.9,
-    camera_id: CameraId = None,
-    formats: Formats = None,
-    frame_times: FrameTimesFile = None,
-    frame_rate: FrameRate = None,
-    first_frame: FirstFrame = None,
-    image_size: ImageSize = None,
-    nms: Nms = None,
-    max_bad: MaxBad = 0.05,
-    box_form: BoxForm = None,
-    box_image: BoxImage = None,
-    letterbox: Letterbox = False,
     config: ConfigFile = None,
     quiet: Quiet = False,
     json: Json = False,
@@ -80,32 +53,24 @@ def locate(
     from dqslam._outputs import output_set
     from dqslam.places.locate_files import described, locate_files, write_locations
 
-    refuse_shared_input(camera, detections, odometry, frame_times)
+    inputs = (known, *files.files, odometry)
+    refuse_shared_input(*inputs[1:])
     output = Output(quiet=quiet, as_json=json)
-    names = io.split_formats(formats or [])
-    frames = given_frame_times(frame_times, frame_rate)
-    readings = given_readings(
-        camera_in_body=None, box_form=box_form, box_image=box_image, letterbox=letterbox
-    )
-    notes = io.Notes(max_bad=max_bad)
+    reading = files.read_options()
+    notes = io.Notes(max_bad=reading.max_bad)
     with output.share("locating") as progress:
         answers = locate_files(
             known,
-            camera,
-            detections,
+            files.camera,
+            files.detections,
             odometry,
             min_score=min_score,
             min_confidence=min_confidence,
-            formats=names,
-            frames=frames,
-            reading=given_reading(
-                first_frame, max_bad, nms, None, image_size, camera_id, readings=readings
-            ),
+            reading=reading,
             notes=notes,
             progress=progress,
         )
     if out is not None:
-        inputs = (known, camera, detections, odometry)
         with output_set(out, "dqslam locate", inputs=inputs) as folder:
             write_locations(folder, answers)
     output.table(_table(answers))

@@ -173,14 +173,13 @@ class ReadingOptions:
 
 
 @dataclass(frozen=True, kw_only=True)
-class RecordingOptions(ReadingOptions):
-    """The three files of a recording, and how they are read together."""
+class ImageOptions(ReadingOptions):
+    """The camera, the boxes of its images, and how they are read together."""
 
     camera: Annotated[
         Path,
         typer.Option(help="Camera file: JSON, TOML, ROS, OpenCV, Kalibr, COLMAP, KITTI, bag, ..."),
     ]
-    odometry: Annotated[Path, typer.Option(help="Trajectory: TUM, KITTI, EuRoC, COLMAP, bag, ...")]
     detections: Annotated[
         Path, typer.Option(help="File or folder of boxes: CSV, COCO, YOLO, MOT, KITTI, bag, ...")
     ]
@@ -201,7 +200,7 @@ class RecordingOptions(ReadingOptions):
     @property
     def files(self) -> tuple[Path | None, ...]:
         """The files that these options name."""
-        return (self.camera, self.odometry, self.detections, *super().files)
+        return (self.camera, self.detections, *super().files)
 
     def read_options(self) -> ReadOptions:
         """Return how the files are read; reads those that options name."""
@@ -212,6 +211,18 @@ class RecordingOptions(ReadingOptions):
             formats=io.split_formats(self.formats or []),
             max_time_difference=self.max_time_difference,
         )
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecordingOptions(ImageOptions):
+    """The three files of a recording, and how they are read together."""
+
+    odometry: Annotated[Path, typer.Option(help="Trajectory: TUM, KITTI, EuRoC, COLMAP, bag, ...")]
+
+    @property
+    def files(self) -> tuple[Path | None, ...]:
+        """The files that these options name."""
+        return (self.odometry, *super().files)
 
 
 def _size(

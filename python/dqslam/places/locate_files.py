@@ -11,7 +11,7 @@ import numpy as np
 
 from dqslam import _core
 from dqslam import io as files
-from dqslam.io import FileError, FrameTimes, Notes, ReadOptions
+from dqslam.io import FileError, Notes, ReadOptions
 from dqslam.io.files import write_text
 from dqslam.io.results import load_map_results
 from dqslam.lens import undistorted_or_nan
@@ -42,8 +42,6 @@ def locate_files(
     *,
     min_score: float = 0.3,
     min_confidence: float = 0.9,
-    formats: files.FormatNames | None = None,
-    frames: FrameTimes | None = None,
     reading: ReadOptions | None = None,
     notes: Notes | None = None,
     progress: Callable[[float], None] = lambda share: None,
@@ -58,7 +56,7 @@ def locate_files(
         Files in any format that ``load_recording`` reads.
     min_score
         Boxes with a lower score are left out.
-    formats, frames, reading, notes
+    reading, notes
         As in ``load_recording``.
 
     Raises
@@ -71,7 +69,7 @@ def locate_files(
     if not 0.0 <= min_score <= 1.0:
         raise ValueError(f"min_score is {min_score:g}, not between 0 and 1")
     place = PlaceMap.of(load_map_results(known))
-    names, how = formats or files.FormatNames(), reading or ReadOptions()
+    how = reading or ReadOptions()
     if odometry is not None:
         recording, _ = files.load_recording(
             camera,
@@ -79,8 +77,6 @@ def locate_files(
             detections,
             ids="none",
             min_score=min_score,
-            formats=names,
-            frames=frames,
             reading=how,
             notes=notes,
         )
@@ -95,8 +91,8 @@ def locate_files(
         )
         time = float(recording.timestamps[found.image])
         return [ImageLocation(time, len(recording.detections), found)]
-    lens = files.read_camera_file(camera, names, how)
-    times, boxes = _read_images(lens, detections, names, frames, how, notes, min_score)
+    lens = files.read_camera_file(camera, how)
+    times, boxes = _read_images(lens, detections, how, notes, min_score)
     answers = []
     for image, time in enumerate(times.tolist()):
         own = boxes.select(boxes.pose == image)
@@ -109,8 +105,6 @@ def locate_files(
 def _read_images(
     lens: _core.Camera,
     path: str | Path,
-    names: files.FormatNames,
-    frames: FrameTimes | None,
     how: ReadOptions,
     notes: Notes | None,
     min_score: float,
@@ -120,10 +114,10 @@ def _read_images(
     size = (lens.width, lens.height)
     table = files.read_detections(
         path,
-        names.detections,
+        how.formats.detections,
         width=lens.width,
         height=lens.height,
-        frames=frames,
+        frames=how.frames,
         first_frame=how.first_frame,
         reread=None if boxes is None else partial(boxes.read, size=size),
         min_score=min_score,
