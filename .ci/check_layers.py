@@ -14,7 +14,9 @@ from pathlib import Path
 ROOMS = ["geometry", "costs", "linear", "problem", "solver", "estimation", "online"]
 UMBRELLA = "dqslam/dqslam.h"  # includes all public headers that need no Ceres
 CERES = re.compile(r"(ceres|glog)/")
-USES_CERES = re.compile(r"dqslam/(costs/.*|geometry/(body|body_derivatives|manifolds|jets)|solver/.*)\.h|.*\.cc")
+USES_CERES = re.compile(
+    r"dqslam/(costs/.*|geometry/(body|body_derivatives|manifolds|jets)|solver/.*)\.h|.*\.cc"
+)
 WITH_CERES = re.compile(r"dqslam/(costs/.*|geometry/(body|manifolds))\.h")  # public: dqslam::costs
 
 Includes = dict[str, dict[str, int]]  # the lines of what each file includes
@@ -46,7 +48,10 @@ def complaints(file: str, target: str, public: set[str]) -> Iterator[str]:
     """Say what is wrong with one file's including another."""
     users_of_ceres = WITH_CERES if file in public else USES_CERES
     if CERES.match(target) and not users_of_ceres.fullmatch(file):
-        yield "Ceres belongs into costs, body.h, manifolds.h, jets.h, private solver headers and .cc files"
+        yield (
+            "Ceres belongs into costs, body.h, manifolds.h, jets.h, private solver headers and .cc "
+            "files"
+        )
     if not target.startswith("dqslam/"):
         return
     if floor(target) > floor(file):
