@@ -47,6 +47,7 @@ nitpick_ignore_regex = [
     ("py:.*", r"dict\[.*|dqslam\.studies\.paper\.methods\.Settings|dqslam\.io\.results\.save\..*"),
     ("py:.*", r"dqslam\.(view\.scene|studies\.sweep|plot)\..*"),
     ("py:.*", r"dqslam\.association\.scene_map\.SceneMap"),  # the inside of an association
+    ("py:.*", r"dqslam\.places\.(sensor\.Sensor|locate_upright\.Upright)"),  # that of a map
 ]
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"

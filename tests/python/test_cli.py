@@ -87,6 +87,8 @@ def test_the_help_of_every_command_has_its_options_and_defaults(name, capsys, mo
     assert main([name, "--help"]) == 0
     shown = capsys.readouterr().out
     for parameter in GROUP.commands[name].params:
+        if getattr(parameter, "hidden", False):
+            continue
         if parameter.opts[0].startswith("--"):
             assert parameter.opts[0] in shown
         if is_number(name, parameter) and parameter.default is not None:

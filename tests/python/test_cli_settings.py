@@ -91,7 +91,7 @@ def test_paper_and_its_configuration(tmp_path, capsys):
     assert main(["paper", *options, "--out", str(tmp_path / "a")]) == 0
     config = tmp_path / "a" / "config.toml"
     content = tomllib.loads(config.read_text())
-    assert (content["shapes"], content["bound"], content["wrong_associations"]) == (
+    assert (content["objects"], content["bound"], content["wrong_associations"]) == (
         "ellipsoids",
         False,
         0.0,

@@ -37,7 +37,13 @@ def align(
     a: Annotated[Path, typer.Argument(metavar="A", help=MAP_HELP)],
     b: Annotated[Path, typer.Argument(metavar="B", help="Another map.")],
     out: Annotated[
-        Path | None, typer.Option(help="Directory for alignment.json; new, or of this command.")
+        Path | None,
+        typer.Option(
+            "--out",
+            "-o",
+            metavar="DIR",
+            help="Directory for alignment.json; new, or of this command.",
+        ),
     ] = None,
     motion: MotionOption = "auto",
     scale: Annotated[

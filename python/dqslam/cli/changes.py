@@ -29,7 +29,10 @@ def changes(
     out: Annotated[
         Path | None,
         typer.Option(
-            metavar="DIR", help="Directory for changes.csv, changes.json and changes.png."
+            "--out",
+            "-o",
+            metavar="DIR",
+            help="Directory for changes.csv, changes.json and changes.png.",
         ),
     ] = None,
     config: ConfigFile = None,

@@ -32,7 +32,9 @@ def locate(
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="Directory for locations.csv and locations.json."),
+        typer.Option(
+            "--out", "-o", metavar="DIR", help="Directory for locations.csv and locations.json."
+        ),
     ] = None,
     min_score: Annotated[
         float, typer.Option(help="Leave out boxes with a lower score, 0 to 1.")

@@ -88,14 +88,14 @@ def paper(
         float,
         typer.Option(min=0.0, max=0.4, help="Share of boxes with a wrong object id, 0 to 0.4."),
     ] = 0.0,
-    wrong_association_kind: Annotated[
+    wrong_kind: Annotated[
         Literal["random", "structured"],
-        typer.Option(
-            "--wrong-kind",
-            "--wrong-association-kind",
-            help="Wrong ids are those of any other object, or of the nearest one.",
-        ),
+        typer.Option(help="Wrong ids are those of any other object, or of the nearest one."),
     ] = "random",
+    wrong_association_kind: Annotated[
+        Literal["random", "structured"] | None,
+        typer.Option(hidden=True, help="The earlier name of --wrong-kind."),
+    ] = None,
     loss: Annotated[
         Literal["none", "huber", "cauchy", "dcs", "switchable", "gnc_tls", "gnc_gm"] | None,
         typer.Option(help="Robust loss on boxes. Default: none, or gnc_gm with wrong ids."),
@@ -117,7 +117,7 @@ def paper(
     chosen = load_scenario(scenario)
     wrong = {
         "wrong_associations": wrong_associations,
-        "wrong_association_kind": wrong_association_kind,
+        "wrong_association_kind": wrong_association_kind or wrong_kind,
     }
     changes = {
         "objects": objects or chosen.objects,
