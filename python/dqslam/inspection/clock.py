@@ -23,7 +23,7 @@ SURE_GAIN, SURE_OFFSET, LEAST_MOTION_PX = 2.0, 3.5, 2.5
 # Beyond this share of the range, a path that repeats itself may fit as well.
 WITHIN = 0.75
 RESAMPLES = 200
-SURE_DRIFT = 4.0
+SURE_DRIFT = 3.5
 MOST_CLOCK_WINDOWS = 5 * MOST_WINDOWS
 
 
@@ -65,8 +65,8 @@ def estimate_clock_offset(
     """Find the offset of the clocks at which boxes move most like the poses say.
 
     It is looked for within a number of steps, intervals of poses or half those of images, in at
-    most so many windows of a length, and between successive images. Of both estimates a sure one
-    counts, or else the one with the smaller spread.
+    most so many windows of a length, and between successive images. Of both estimates one that
+    surely drifts counts, then a sure one, or else the one with the smaller spread.
 
     Raises
     ------
@@ -83,7 +83,7 @@ def estimate_clock_offset(
         found.append(_offset(step_costs(evidence, offsets), step, speed))
     if not found:
         raise NotEnoughDataError("too few boxes move from view to view")
-    return min(found, key=lambda one: (not one.sure, one.sigma))
+    return min(found, key=lambda one: (not one.drifts, not one.sure, one.sigma))
 
 
 def _offset(compared: TimeCosts, step: float, speed: float) -> ClockOffset:
