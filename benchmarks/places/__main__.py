@@ -1,61 +1,27 @@
-"""``python -m benchmarks.places``: the tables of docs/places.md."""
+"""``python -m benchmarks.places CASE``: the tables of docs/places.md and docs/locate.md."""
 
 from __future__ import annotations
 
-import sys
-from functools import partial
-from typing import Annotated
-
-import numpy as np
 import typer
-from rich.console import Console
 
-from benchmarks.places import merging, real
+from benchmarks.places import changes, locate, robots_table
 
-_CASES = ("robots", "real")
-
-
-def places(
-    case: Annotated[str, typer.Argument(help=f"One of {', '.join(_CASES)}.")] = "robots",
-    trials: Annotated[int, typer.Option(min=1, help="Pairs of robots, or draws of a frame.")] = 200,
-    seed: Annotated[int, typer.Option(min=0, help="Of the first pair.")] = 0,
-) -> None:
-    """Measure how often maps of two robots are aligned, and how good the merged map is."""
-    if case not in _CASES:
-        raise typer.BadParameter(f"no case {case!r}; there are: {', '.join(_CASES)}")
-    if case == "real":
-        say = partial(Console(soft_wrap=True).print, markup=False, highlight=False)
-        say("| maps | | turn [deg] | shift [m] |\n|---|---|---|---|")
-        for place in real.PLACES:
-            for row in real.pairs(place, trials):
-                say(row)
-        return
-    found = []
-    for number in range(seed, seed + trials):
-        found.append(merging.run(number))
-        sys.stderr.write(f"== {number}: {found[-1].refused or 'aligned'}\n")
-    show(found)
-
-
-def show(found: list[merging.Trial]) -> None:
-    """Print the table of all pairs."""
-    aligned = [one for one in found if not one.refused]
-    say = partial(Console(soft_wrap=True).print, markup=False, highlight=False)
-    say(f"pairs of robots: {len(found)}, refused: {len(found) - len(aligned)}")
-    if not aligned:
-        return
-    rows = {
-        "turn of the alignment, error [deg]": [abs(one.turn_deg) for one in aligned],
-        "common objects, error of the alignment [m]": [one.shift_m for one in aligned],
-        "NEES of merged centers / 3": [one.nees for one in aligned],
-        "merged centers, error [m]": [one.merged_m for one in aligned],
-        "first map alone [m]": [one.single_m[0] for one in aligned],
-        "second map alone [m]": [one.single_m[1] for one in aligned],
-    }
-    say("| | mean | median | largest |\n|---|---|---|---|")
-    for name, values in rows.items():
-        say(f"| {name} | {np.mean(values):.3f} | {np.median(values):.3f} | {max(values):.3f} |")
+app = typer.Typer(
+    add_completion=False,
+    no_args_is_help=True,
+    help="Measure what is found by maps of objects, a case at a time: CASE --help has its options.",
+)
+for _name, _case in (
+    ("robots", robots_table.merge_pairs),
+    ("real", robots_table.align_real),
+    ("rooms", locate.count_rooms),
+    ("recording", locate.locate_recording),
+    ("large", locate.locate_in_large_map),
+    ("changes", changes.count_changes),
+    ("halves", changes.compare_halves),
+):
+    app.command(_name)(_case)
 
 
 if __name__ == "__main__":
-    typer.run(places)
+    app(prog_name="python -m benchmarks.places")

@@ -1,8 +1,4 @@
-"""``python -m benchmarks.places.changes``: changes that ``dqslam changes`` finds, counted.
-
-``rooms`` maps simulated rooms twice, with changes between, and compares with the truth. ``halves``
-maps the two halves of a recording, with the noise of odometry of several seeds.
-"""
+"""Changes that ``dqslam changes`` finds, counted: in simulated rooms, and in halves of a tour."""
 
 from collections import Counter
 from dataclasses import replace
@@ -17,11 +13,9 @@ from rich.table import Table
 import dqslam as dq
 from benchmarks.places import rooms
 
-app = typer.Typer(add_completion=False, help=__doc__)
 MOVED_M = (0.3, 2.0)
 
 
-@app.command("rooms")
 def count_changes(
     count: Annotated[int, typer.Option(help="Rooms.")] = 100,
     seed: Annotated[int, typer.Option(help="Of the first room.")] = 0,
@@ -100,7 +94,6 @@ def _show(title: str, counts: Counter[tuple[str, str]]) -> None:
     Console(width=110).print(table)
 
 
-@app.command("halves")
 def compare_halves(
     camera: Annotated[Path, typer.Option()],
     odometry: Annotated[Path, typer.Option()],
@@ -132,7 +125,3 @@ def compare_halves(
         found = dq.changes(*folders)
         told = [f"{one.status} {one.class_name} {one.probability:.2f}" for one in found.objects]
         typer.echo(f"{seed}: {found} {'; '.join(told)}")
-
-
-if __name__ == "__main__":
-    app()

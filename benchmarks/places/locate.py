@@ -1,8 +1,4 @@
-"""``python -m benchmarks.places.locate``: answers of ``dqslam locate``, counted and timed.
-
-``rooms`` counts right answers by their confidence in simulated rooms (``benchmarks.places.rooms``),
-``recording`` locates images of a recording in a map, and ``large`` in a map of many objects.
-"""
+"""Answers of ``dqslam locate``, counted and timed: in rooms, in a recording, in a large map."""
 
 import time
 from dataclasses import dataclass, field
@@ -20,7 +16,6 @@ from benchmarks.places import rooms
 CONFIDENCES = (0.5, 0.8, 0.9, 0.95, 0.99, 0.999)
 RIGHT_M, RIGHT_RAD = 0.5, 0.26
 SE3 = dq.PoseModel.SE3
-app = typer.Typer(add_completion=False, help=__doc__)
 
 
 @dataclass
@@ -93,7 +88,6 @@ class Answers:
         )
 
 
-@app.command("rooms")
 def count_rooms(
     count: Annotated[int, typer.Option(help="Rooms.")] = 40,
     seed: Annotated[int, typer.Option(help="Of the first room.")] = 100,
@@ -117,7 +111,6 @@ def count_rooms(
     answers.show(f"{count} rooms from seed {seed}, images in the room {images}", images)
 
 
-@app.command("recording")
 def locate_recording(
     known: Annotated[Path, typer.Argument(metavar="MAP", help="Results: the map.")],
     camera: Annotated[Path, typer.Option()],
@@ -150,7 +143,6 @@ def _in_frame(whole: dq.io.Results, part: dq.io.Results) -> np.ndarray:
     return dq.align_rigid(whole.poses[rows, :3], part.poses[:, :3]).apply_poses(whole.poses)
 
 
-@app.command("large")
 def locate_in_large_map(
     count: Annotated[int, typer.Option(help="Objects.")] = 10_000,
     classes: Annotated[int, typer.Option()] = 20,
@@ -172,7 +164,3 @@ def locate_in_large_map(
         if len(own):
             answers.add(place, own, rooms.CAMERA, pose)
     answers.show(f"{count} objects of {classes} classes", len(answers.seconds))
-
-
-if __name__ == "__main__":
-    app()

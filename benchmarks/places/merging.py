@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -31,6 +31,8 @@ class Trial:
     """Mean error of the merged centers, in the frame of the first robot."""
     single_m: tuple[float, float]
     """Mean error of each map alone, in its own frame."""
+    single_nees: tuple[float, float]
+    """NEES of the centers of each map alone, divided by 3."""
 
 
 def _landmarks(robot: Robot, folder: Path) -> Landmarks:
@@ -44,11 +46,17 @@ def run(seed: int) -> Trial:
     with tempfile.TemporaryDirectory() as directory:
         maps = [_landmarks(one, Path(directory) / str(row)) for row, one in enumerate((a, b))]
     single = tuple(float(_errors(one).mean()) for one in (a, b))
-    nothing = Trial(seed, "", np.nan, np.nan, np.nan, np.nan, (single[0], single[1]))
+    honest = tuple(
+        _nees(one.centers - robot.truth.center[one.object_ids], one.covariances)
+        for one, robot in zip(maps, (a, b), strict=True)
+    )
+    nothing = Trial(
+        seed, "", np.nan, np.nan, np.nan, np.nan, (single[0], single[1]), (honest[0], honest[1])
+    )
     try:
         merged = merge(*maps)
     except CannotTellError as error:
-        return Trial(**vars(nothing) | {"refused": str(error)})
+        return replace(nothing, refused=str(error))
     found = merged.parts[1].alignment
     assert found is not None
     truth = true_motion(a, b)
@@ -63,16 +71,12 @@ def run(seed: int) -> Trial:
     new = rows >= len(maps[0])
     true_ids[rows[new]] = maps[1].object_ids[new]
     errors = merged.landmarks.centers - a.truth.center[true_ids]
-    inverse = np.linalg.inv(merged.landmarks.covariances)
-    squares = np.einsum("oi,oij,oj->o", errors, inverse, errors) / 3.0
-    return Trial(
-        seed=seed,
-        refused="",
+    return replace(
+        nothing,
         turn_deg=float(np.degrees(np.arctan2(turn[1], turn[0]))),
         shift_m=float(np.linalg.norm(apart[:, :2], axis=1).mean()),
-        nees=float(squares.mean()),
+        nees=_nees(errors, merged.landmarks.covariances),
         merged_m=float(np.linalg.norm(errors, axis=1).mean()),
-        single_m=(single[0], single[1]),
     )
 
 
@@ -80,3 +84,9 @@ def _errors(robot: Robot) -> Floats:
     ids = robot.estimate.object_ids
     error = robot.estimate.centers - robot.truth.center[ids]
     return np.asarray(np.linalg.norm(error, axis=1))
+
+
+def _nees(errors: Floats, covariances: Floats) -> float:
+    """Return the mean squared error (o, 3) in units of its covariance, divided by 3."""
+    solved = np.linalg.solve(covariances, errors[:, :, None])[:, :, 0]
+    return float((errors * solved).sum(axis=1).mean() / 3.0)

@@ -4,6 +4,7 @@ It shares no code with the package: boxes are the extremes of points on the surf
 """
 
 import json
+import shutil
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -113,3 +114,25 @@ def write_map(folder, centers=CENTERS, names=NAMES, poses=None, sigma_m=0.005, w
                 )
         (folder / "boxes.csv").write_text("\n".join(rows) + "\n")
     return folder
+
+
+def write_turned(before, folder):
+    """Copy a folder of results into another frame; also return the motion into it, (4, 4)."""
+    turn, shift = Rotation.from_euler("z", 40, degrees=True), np.array([1.0, -2.0, 0.3])
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = turn.as_matrix(), shift
+    poses = dq.load_results(before).poses
+    shutil.copytree(before, folder)
+    content = json.loads((before / "map.json").read_text())
+    for one in content["objects"]:
+        one["center"] = (turn.apply(one["center"]) + shift).tolist()
+        turned = turn * Rotation.from_quat(one["orientation_xyzw"])
+        one["orientation_xyzw"] = turned.as_quat().tolist()
+    (folder / "map.json").write_text(json.dumps(content))
+    moved = [
+        [*(turn.apply(p[:3]) + shift), *(turn * Rotation.from_quat(p[3:])).as_quat()] for p in poses
+    ]
+    lines = [f"{i} " + " ".join(f"{x:.9f}" for x in pose) for i, pose in enumerate(moved)]
+    for name in ("trajectory.txt", "odometry.txt"):
+        (folder / name).write_text("\n".join(lines) + "\n")
+    return folder, matrix

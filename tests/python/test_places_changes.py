@@ -9,7 +9,7 @@ import dqslam as dq
 from dqslam.places.changes_files import distance_and_sigma, read_alignment, write_changes
 from dqslam.places.changes_map import missed
 from dqslam.places.visibility import view_objects
-from small_place import CENTERS, NAMES, pose_at, write_map
+from small_place import CENTERS, NAMES, pose_at, write_map, write_turned
 
 
 def status_of(found):
@@ -76,27 +76,7 @@ def test_nothing_changed_where_nobody_looked(before, tmp_path):
 
 def test_maps_in_two_frames_need_their_motion(before, tmp_path):
     """A map that is turned by 40 degrees and shifted has nothing in common without it."""
-    from scipy.spatial.transform import Rotation
-
-    turn, shift = Rotation.from_euler("z", 40, degrees=True), np.array([1.0, -2.0, 0.3])
-    results = dq.load_results(before)
-    matrix = np.eye(4)
-    matrix[:3, :3], matrix[:3, 3] = turn.as_matrix(), shift
-    content = json.loads((before / "map.json").read_text())
-    for one in content["objects"]:
-        one["center"] = (turn.apply(one["center"]) + shift).tolist()
-        one["orientation_xyzw"] = (
-            (turn * Rotation.from_quat(one["orientation_xyzw"])).as_quat().tolist()
-        )
-    after = write_map(tmp_path / "b")
-    (after / "map.json").write_text(json.dumps(content))
-    poses = [
-        [*(turn.apply(p[:3]) + shift), *(turn * Rotation.from_quat(p[3:])).as_quat()]
-        for p in results.poses
-    ]
-    lines = [f"{i} " + " ".join(f"{x:.9f}" for x in pose) for i, pose in enumerate(poses)]
-    for name in ("trajectory.txt", "odometry.txt"):
-        (after / name).write_text("\n".join(lines) + "\n")
+    after, matrix = write_turned(before, tmp_path / "b")
     found = dq.changes(before, after, second_from_first=matrix)
     assert [one.status for one in found.objects] == ["stayed"] * len(NAMES)
     # A motion that is 4 cm wrong is corrected by the objects.
@@ -104,7 +84,7 @@ def test_maps_in_two_frames_need_their_motion(before, tmp_path):
     wrong[:3, 3] += [0.03, -0.02, 0.02]
     found = dq.changes(before, after, second_from_first=wrong)
     assert len(found.of("stayed")) == len(NAMES)
-    np.testing.assert_allclose(found.second_from_first[:3, 3], shift, atol=0.01)
+    np.testing.assert_allclose(found.second_from_first[:3, 3], matrix[:3, 3], atol=0.01)
 
 
 def test_a_motion_that_is_none_is_refused(before):

@@ -1,16 +1,18 @@
 """``dqslam changes``: what has changed between two maps of one place."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from dqslam.cli.align import CANNOT_TELL
 from dqslam.cli.output import Json, Output, Quiet
 from dqslam.cli.settings import ConfigFile
 
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from dqslam._checks import Floats
     from dqslam.places.changes import Changes
 
 _STYLES = {"moved": "yellow", "vanished": "red", "appeared": "green", "unknown": "dim"}
@@ -22,10 +24,15 @@ def changes(
     b_from_a: Annotated[
         Path | None,
         typer.Option(
-            help="JSON file with b_from_a, 4 x 4, and covariance, 6 x 6, of the frames. Default: "
-            "both maps have one frame."
+            help="JSON file with b_from_a, 4 x 4, and covariance, 6 x 6, of the frames, as "
+            "`dqslam align` writes it. Default: the objects tell whether both maps have one "
+            "frame, and else how they are aligned."
         ),
     ] = None,
+    one_frame: Annotated[
+        bool,
+        typer.Option("--one-frame", help="Both maps have one frame, whatever the objects tell."),
+    ] = False,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -43,16 +50,30 @@ def changes(
 
     Both maps need the boxes that `run` writes beside them: an object has vanished only if the
     cameras of B looked at its place and should have found it. docs/locate.md describes the table.
+    Exits with 3, and writes nothing, if the objects do not tell how the maps lie to each other.
     """
     from dqslam._outputs import output_set
     from dqslam.cli.results import draw_figure
+    from dqslam.places.alignment import CannotTellError
     from dqslam.places.changes import changes as find_changes
     from dqslam.places.changes_files import described, read_alignment, write_changes
 
     output = Output(quiet=quiet, as_json=json)
-    pose, covariance = (None, None) if b_from_a is None else read_alignment(b_from_a)
-    with output.waiting("comparing"):
-        found = find_changes(first, second, second_from_first=pose, covariance=covariance)
+    if one_frame and b_from_a is not None:
+        raise typer.BadParameter("--one-frame and --b-from-a contradict each other")
+    pose: Floats | Literal["find"] | None = None if one_frame else "find"
+    covariance = None
+    if b_from_a is not None:
+        pose, covariance = read_alignment(b_from_a)
+    try:
+        with output.waiting("comparing"):
+            found = find_changes(first, second, second_from_first=pose, covariance=covariance)
+    except CannotTellError as error:
+        output.warn(
+            f"cannot tell how {first} and {second} lie to each other: {error}; "
+            "--one-frame or --b-from-a says it"
+        )
+        raise typer.Exit(CANNOT_TELL) from None
     why_not = ""
     if out is not None:
         with output_set(out, "dqslam changes", inputs=(first, second, b_from_a)) as folder:
@@ -65,6 +86,8 @@ def changes(
 
             why_not = draw_figure(output, folder / "changes.png", draw)
     output.table(_table(found))
+    if found.frame:
+        output.line(f"frames: {found.frame}")
     output.line(str(found))
     if out is not None:
         output.line(why_not or f"wrote {out}")

@@ -14,14 +14,13 @@ from dqslam._checks import Floats, as_covariances, as_floats
 from dqslam._repr import counted
 from dqslam.io import Results
 from dqslam.io.results import load_map_results
+from dqslam.places.changes_frames import find_frame, frame_covariance
 from dqslam.places.changes_map import SeenMap
 from dqslam.places.changes_match import CENTER_M, CENTER_SHARE, Assignment, match_maps
 
 Status = Literal["stayed", "moved", "vanished", "appeared", "unknown"]
 STATUSES: tuple[Status, ...] = ("stayed", "moved", "vanished", "appeared", "unknown")
 
-# Error of the frames of two maps that are said to have one: meters and radians.
-FRAME_SIGMA_M, FRAME_SIGMA_RAD = 0.05, 0.02
 # Rounds in which the frames are fitted by the objects that stayed.
 _ROUNDS = 4
 # The least probability of a change; below, it is not told from an object that was overlooked.
@@ -69,6 +68,8 @@ class Changes:
     """Pose that was used, fitted by the objects that stayed, shape (4, 4)."""
     cameras: Floats
     """Poses of the images of the second map, world_from_camera, shape (n, 7)."""
+    frame: str = ""
+    """How the frames were found, if that was asked for."""
 
     def of(self, status: Status) -> tuple[Change, ...]:
         """Return the objects of a status."""
@@ -84,7 +85,7 @@ def changes(
     first: Results | str | Path,
     second: Results | str | Path,
     *,
-    second_from_first: ArrayLike | None = None,
+    second_from_first: ArrayLike | Literal["find"] | None = None,
     covariance: ArrayLike | None = None,
 ) -> Changes:
     """Tell which objects stayed, moved, vanished or appeared, or that nobody looked.
@@ -95,7 +96,8 @@ def changes(
         Two maps with the boxes that they were made from: results or their folders.
     second_from_first
         Pose of the first map in the frame of the second, shape (4, 4); by default, both have one
-        frame.
+        frame. ``"find"`` looks at the objects: either they are where they were in one frame, or
+        both maps are aligned, see ``align``; ``Changes.frame`` says which.
     covariance
         Of that pose: translation [m], then rotation [rad], in the frame of the second map, shape
         (6, 6); by default that of 5 cm and 0.02 rad.
@@ -104,6 +106,8 @@ def changes(
     ------
     ValueError
         If the pose or the covariance is none, or a map has no ellipsoid.
+    CannotTellError
+        If the motion between the frames is to be found, and the objects do not say it.
     FileError
         If a folder has no results.
 
@@ -126,11 +130,16 @@ def changes(
     from scipy.spatial.transform import Rotation
 
     before, after = _results(first), _results(second)
-    pose = _pose(second_from_first)
-    spread = np.diag([FRAME_SIGMA_M**2] * 3 + [FRAME_SIGMA_RAD**2] * 3)
+    unmoved, spread, told = _pose(None), frame_covariance(), ""
+    other = SeenMap.of(after, unmoved)
+    if isinstance(second_from_first, str):
+        if second_from_first != "find" or covariance is not None:
+            raise ValueError('second_from_first: a matrix, None, or "find" without a covariance')
+        wide = _with_frame_error(SeenMap.of(before, unmoved), spread)
+        second_from_first, spread, told = find_frame(before, after, wide, other)
     if covariance is not None:
         spread = as_covariances("covariance", np.asarray(covariance)[None], 1, 6)[0]
-    other = SeenMap.of(after, np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]))
+    pose = _pose(second_from_first)
     pose, spread = _fit_frames(before, other, pose, spread)
     one = _with_frame_error(SeenMap.of(before, pose), spread)
     looks_after, looks_before = other.looks_at(one), one.looks_at(other)
@@ -138,7 +147,7 @@ def changes(
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = Rotation.from_quat(pose[3:]).as_matrix(), pose[:3]
     objects = tuple(_described(one, other, found, looks_after, looks_before))
-    return Changes(objects, matrix, other.poses)
+    return Changes(objects, matrix, other.poses, told)
 
 
 def _results(source: Results | str | Path) -> Results:

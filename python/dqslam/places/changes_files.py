@@ -11,6 +11,7 @@ import numpy as np
 from dqslam._checks import Floats, as_covariances, as_floats
 from dqslam.io.files import FileError, read_text, write_json, write_text
 from dqslam.places.changes import Change, Changes
+from dqslam.places.changes_frames import covariance_in_b
 
 _COLUMNS = (
     *("status", "probability", "first_id", "second_id", "class_name"),
@@ -20,6 +21,9 @@ _COLUMNS = (
 
 def read_alignment(path: str | Path) -> tuple[Floats, Floats | None]:
     """Read ``b_from_a`` (4, 4) and, if it is there, ``covariance`` (6, 6) from a JSON file.
+
+    In the file, the covariance is of a small motion in the frame of A, as ``dqslam align`` writes
+    it. It may be 0 for roll and pitch. What is returned is in the frame of B.
 
     Raises
     ------
@@ -36,7 +40,8 @@ def read_alignment(path: str | Path) -> tuple[Floats, Floats | None]:
         pose = as_floats("b_from_a", content["b_from_a"], [4, 4])
         if content.get("covariance") is None:
             return pose, None
-        return pose, as_covariances("covariance", [content["covariance"]], 1, 6)[0]
+        given = as_floats("covariance", content["covariance"], [6, 6])
+        return pose, as_covariances("covariance", [covariance_in_b(pose, given)], 1, 6)[0]
     except ValueError as error:
         raise FileError(path, str(error)) from None
 
@@ -52,6 +57,7 @@ def described(found: Changes) -> dict[str, Any]:
     """Return changes as plain data."""
     return {
         "second_from_first": found.second_from_first,
+        "frame": found.frame,
         "objects": [vars(one) for one in found.objects],
     }
 

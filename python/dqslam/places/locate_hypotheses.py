@@ -9,7 +9,8 @@ boxes give two poses: those in which the camera is not tilted sideways.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
+from typing import Self
 
 import numpy as np
 
@@ -22,6 +23,8 @@ from dqslam.places.locate_upright import Upright
 _LEAST_LABEL = 0.1
 # Boxes, at most, that hypotheses set out from.
 _MOST_BOXES = 10
+# Pairs of objects that boxes are compared with, about, and the boxes that are left in any case.
+_MOST_COMPARED, _FEWEST_BOXES = 200_000, 3
 # Sigmas within which distances agree.
 _AGREE = 3.0
 # Relative error of a distance between objects, from their centers in the image and in the map, and
@@ -59,6 +62,10 @@ class Pairings:
     def __len__(self) -> int:
         """Return the number of pairings."""
         return len(self.box)
+
+    def select(self, rows: Bools) -> Self:
+        """Return some of the pairings."""
+        return replace(self, **{one.name: getattr(self, one.name)[rows] for one in fields(self)})
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +111,8 @@ def find_hypotheses(pairings: Pairings, whole: Bools, upright: Upright | None) -
     """
     boxes, counts = np.unique(pairings.box, return_counts=True)
     chosen = boxes[np.lexsort((counts, ~whole[boxes]))[:_MOST_BOXES]]
-    pairs = _agreeing_pairs(pairings, np.flatnonzero(np.isin(pairings.box, chosen)))
+    chosen, reach = _within_budget(pairings, chosen)
+    pairs = _agreeing_pairs(pairings, chosen, reach)
     triples = _supported(pairings, pairs, _triples(pairs, len(pairings)))
     found = [_resect(pairings, triples)]
     if upright is not None and len(pairs) <= _MOST_TRIPLES:
@@ -115,17 +123,58 @@ def find_hypotheses(pairings: Pairings, whole: Bools, upright: Upright | None) -
     )
 
 
-def _agreeing_pairs(pairings: Pairings, rows: Ints) -> Ints:
+def _reaches(pairings: Pairings, boxes: Ints) -> Floats:
+    """Return the largest distances between objects that two boxes may show, (b, b), meters."""
+    of_box = [pairings.box == one for one in boxes.tolist()]
+    ray = np.array([pairings.ray[own][0] for own in of_box])
+    ends = [pairings.log_distance[own] for own in of_box]
+    low, high = np.exp([one.min() for one in ends]), np.exp([one.max() for one in ends])
+    error = high * np.array([pairings.sigma[own].max() for own in of_box])
+    blur = np.array([pairings.ray_sigma[own][0] for own in of_box])
+    cosine = ray @ ray.T
+    # The square of the third side is convex in the other two: it is largest at their ends.
+    corners = [
+        a[:, None] ** 2 + b[None, :] ** 2 - 2.0 * a[:, None] * b[None, :] * cosine
+        for a in (low, high)
+        for b in (low, high)
+    ]
+    by_ray = 0.5 * (high[:, None] + high[None, :]) * np.maximum(blur[:, None], blur[None, :])
+    sigma = np.sqrt(error[:, None] ** 2 + error[None, :] ** 2 + by_ray**2)
+    return np.asarray(np.sqrt(np.maximum(np.max(corners, axis=0), 0.0)) + _AGREE * sigma)
+
+
+def _within_budget(pairings: Pairings, boxes: Ints) -> tuple[Ints, Floats]:
+    """Return as many of the boxes (b,) as the search has time for, and their reaches (b, b).
+
+    Among thousands of objects of one class, boxes of objects that are near each other are compared
+    with few pairs of objects. At least three boxes are returned.
+    """
+    if not len(boxes):
+        return boxes, np.zeros((0, 0))
+    reach = _reaches(pairings, boxes)
+    count = np.array([np.sum(pairings.box == one) for one in boxes.tolist()], dtype=float)
+    area = float(np.sort(np.ptp(pairings.center, axis=0))[-2:].prod())
+    share = np.minimum(np.pi * reach**2 / max(area, 1e-12), 1.0)
+    cost = count[:, None] * count[None, :] * share
+    np.fill_diagonal(cost, 0.0)
+    kept = list(range(len(boxes)))
+    while len(kept) > _FEWEST_BOXES and cost[np.ix_(kept, kept)].sum() > 2.0 * _MOST_COMPARED:
+        kept.pop(int(cost[np.ix_(kept, kept)].sum(axis=1).argmax()))
+    return boxes[kept], reach[np.ix_(kept, kept)]
+
+
+def _agreeing_pairs(pairings: Pairings, boxes: Ints, reach: Floats) -> Ints:
     """Return pairs of pairings, the first of the lower box, whose distances agree, shape (p, 2)."""
     from scipy.spatial import cKDTree
 
-    of_box = [rows[pairings.box[rows] == one] for one in np.unique(pairings.box[rows])]
+    order = np.argsort(boxes)
+    boxes, reach = boxes[order], reach[np.ix_(order, order)]
+    of_box = [np.flatnonzero(pairings.box == one) for one in boxes.tolist()]
     trees = [cKDTree(pairings.center[one]) for one in of_box]
-    far = [np.exp((pairings.log_distance + _AGREE * pairings.sigma)[one].max()) for one in of_box]
     found = [np.zeros((0, 2), dtype=np.int64)]
     for a in range(len(of_box)):
         for b in range(a + 1, len(of_box)):
-            near = trees[a].sparse_distance_matrix(trees[b], far[a] + far[b], output_type="ndarray")
+            near = trees[a].sparse_distance_matrix(trees[b], reach[a, b], output_type="ndarray")
             i, j, distance = of_box[a][near["i"]], of_box[b][near["j"]], near["v"]
             found.append(np.column_stack([i, j])[_agrees(pairings, i, j, distance)])
     return np.concatenate(found)

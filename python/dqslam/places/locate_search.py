@@ -8,16 +8,16 @@ import numpy as np
 
 from dqslam import _core
 from dqslam._checks import Bools, Floats, Ints
-from dqslam.places.locate_hypotheses import Hypotheses, Pairings, find_hypotheses, pair_up
-from dqslam.places.locate_map import ImageBoxes, PlaceMap
+from dqslam.places.locate_hypotheses import Hypotheses, find_hypotheses, pair_up
+from dqslam.places.locate_map import PlaceMap
+from dqslam.places.locate_quick import MOST_OBJECTS, quick_score
 from dqslam.places.locate_score import SE3, Frame, Matches, Scored, Scorer
 
-# Hypotheses of each image that are compared with its boxes quickly, and scored.
-_MOST_QUICK, _MOST_SCORED = 4000, 24
+# Hypotheses of each image that are compared with its boxes quickly, in a small and in a large map,
+# and scored.
+_MOST_QUICK, _MOST_QUICK_LARGE, _MOST_SCORED = 4000, 500, 24
 # Hypotheses that each round of assignment and refinement continues with.
 _MOST_REFINED = (24, 8, 8)
-# Sigma of the direction of a box's middle: constant [rad], and a share of its half side.
-_RAY_SIGMA, _RAY_SHARE = 0.015, 0.25
 # Poses as near as this lead to the same: a share of the sight, and radians.
 _SAME_SHARE, _SAME_ANGLE = 0.03, 0.1
 # Poses as near as this are one answer.
@@ -144,8 +144,9 @@ def _starts(place: PlaceMap, camera: _core.Camera, frame: Frame) -> Floats:
     image = frame.boxes
     pairings = pair_up(place, camera, image)
     whole = np.asarray(~image.truncated.any(axis=1))
-    found = _strongest(find_hypotheses(pairings, whole, place.upright), place.sensor.sight)
-    score = _quick_score(place, image, pairings, found)
+    most = _MOST_QUICK if len(place.ellipsoids) <= MOST_OBJECTS else _MOST_QUICK_LARGE
+    found = _strongest(find_hypotheses(pairings, whole, place.upright), place.sensor.sight, most)
+    score = quick_score(place, image, pairings, found)
     if place.upright is not None:
         score += place.upright.log_prior(found.rotation)
     best = np.argsort(-score, kind="stable")[: 4 * _MOST_SCORED]
@@ -156,49 +157,16 @@ def _starts(place: PlaceMap, camera: _core.Camera, frame: Frame) -> Floats:
     return _core.compose(SE3, poses, np.tile(back, (len(poses), 1)))
 
 
-def _strongest(found: Hypotheses, sight: float) -> Hypotheses:
-    """Return the hypotheses that most others are near to, if there are very many."""
+def _strongest(found: Hypotheses, sight: float, most: int) -> Hypotheses:
+    """Return the hypotheses that most others are near to, if there are more than ``most``."""
     from scipy.spatial import cKDTree
 
     count = len(found.position)
-    if count <= _MOST_QUICK:
+    if count <= most:
         return found
     where = np.hstack(
         [found.position / (0.1 * sight), found.rotation[:, :, 0] * 5, found.rotation[:, :, 2] * 5]
     )
     near = cKDTree(where).query_ball_point(where, 1.0, return_length=True)
-    keep = np.argsort(-near, kind="stable")[:_MOST_QUICK]
+    keep = np.argsort(-near, kind="stable")[:most]
     return Hypotheses(found.rotation[keep], found.position[keep])
-
-
-def _quick_score(
-    place: PlaceMap, image: ImageBoxes, pairings: Pairings, found: Hypotheses
-) -> Floats:
-    """Score hypotheses by directions and distances of the objects that boxes may show, (h,)."""
-    if not len(found.position):
-        return np.zeros(0)
-    variance = np.diagonal(image.covariance, axis1=1, axis2=2)
-    free = ~image.truncated
-    peak = -0.5 * np.where(free, np.log(2.0 * np.pi * variance), 0.0).sum(axis=1)
-    gain = pairings.log_odds + (peak - image.log_false)[pairings.box]
-    useful: Bools = gain > 0.0
-    box, ray, center = pairings.box[useful], pairings.ray[useful], pairings.center[useful]
-    if not len(box):
-        return np.zeros(len(found.position))
-    half = np.exp(place.size[pairings.object_row[useful], 0] - pairings.log_distance[useful])
-    sigma_ray = np.hypot(_RAY_SIGMA, _RAY_SHARE * half)
-    first = np.flatnonzero(np.concatenate([[True], box[1:] != box[:-1]]))
-    score = np.zeros(len(found.position))
-    chunk = max(1, 300_000 // len(box))
-    for start in range(0, len(score), chunk):
-        part = slice(start, start + chunk)
-        rotation, position = found.rotation[part], found.position[part]
-        offset = np.einsum("hi,hij->hj", position, rotation)
-        inside = np.einsum("ni,hij->hnj", center, rotation) - offset[:, None, :]
-        distance = np.sqrt((inside**2).sum(axis=2))
-        cosine = (inside * ray).sum(axis=2) / distance
-        error = 2.0 * (1.0 - cosine) / sigma_ray**2
-        error += ((np.log(distance) - pairings.log_distance[useful]) / pairings.sigma[useful]) ** 2
-        own = np.maximum(gain[useful] - 0.5 * error, 0.0)
-        score[part] = np.maximum.reduceat(own, first, axis=1).sum(axis=1)
-    return score

@@ -1,0 +1,62 @@
+"""The tables of maps that are aligned and merged: simulated pairs of robots, and real maps."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Annotated
+
+import numpy as np
+import typer
+from rich.console import Console
+
+from benchmarks.places import merging, real
+
+
+def merge_pairs(
+    trials: Annotated[int, typer.Option(min=1, help="Pairs of robots.")] = 60,
+    seed: Annotated[int, typer.Option(min=0, help="Of the first pair.")] = 0,
+) -> None:
+    """Merge the maps of two simulated robots: how often, how well, and how honestly."""
+    found = []
+    for number in range(seed, seed + trials):
+        found.append(merging.run(number))
+        one = found[-1]
+        told = one.refused or f"aligned, {one.shift_m:.3f} m off, NEES / 3 {one.nees:.2f}"
+        typer.echo(f"== {number}: {told}", err=True)
+    _show(found)
+
+
+def align_real(
+    trials: Annotated[int, typer.Option(min=1, help="Draws of a frame for each pair.")] = 20,
+) -> None:
+    """Align published maps of one place, turned and shifted at random."""
+    say = _printer()
+    say("| maps | | turn [deg] | shift [m] |\n|---|---|---|---|")
+    for place in real.PLACES:
+        for row in real.pairs(place, trials):
+            say(row)
+
+
+def _show(found: list[merging.Trial]) -> None:
+    aligned = [one for one in found if not one.refused]
+    say = _printer()
+    say(f"pairs of robots: {len(found)}, refused: {len(found) - len(aligned)}")
+    if not aligned:
+        return
+    rows = {
+        "turn of the alignment, error [deg]": [abs(one.turn_deg) for one in aligned],
+        "common objects, error of the alignment [m]": [one.shift_m for one in aligned],
+        "NEES of merged centers / 3": [one.nees for one in aligned],
+        "merged centers, error [m]": [one.merged_m for one in aligned],
+        "first map alone [m]": [one.single_m[0] for one in aligned],
+        "second map alone [m]": [one.single_m[1] for one in aligned],
+        "NEES of the first map alone / 3": [one.single_nees[0] for one in aligned],
+        "NEES of the second map alone / 3": [one.single_nees[1] for one in aligned],
+    }
+    say("| | mean | median | largest |\n|---|---|---|---|")
+    for name, values in rows.items():
+        say(f"| {name} | {np.mean(values):.3f} | {np.median(values):.3f} | {max(values):.3f} |")
+
+
+def _printer() -> partial[None]:
+    return partial(Console(soft_wrap=True).print, markup=False, highlight=False)

@@ -1,0 +1,86 @@
+"""A quick score of hypotheses: by directions and distances of the objects that boxes may show."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dqslam._checks import Bools, Floats
+from dqslam.places.locate_hypotheses import Hypotheses, Pairings
+from dqslam.places.locate_map import ImageBoxes, PlaceMap
+
+# Sigma of the direction of a box's middle: constant [rad], and a share of its half side.
+_RAY_SIGMA, _RAY_SHARE = 0.015, 0.25
+# In a larger map, only the objects near each hypothesis are compared with its boxes: so many around
+# the point at this share of the sight ahead.
+MOST_OBJECTS, _AHEAD = 200, 0.4
+# Cells of a table that is made at once.
+_MOST_CELLS = 300_000
+
+
+def quick_score(
+    place: PlaceMap, image: ImageBoxes, pairings: Pairings, found: Hypotheses
+) -> Floats:
+    """Score hypotheses, (h,)."""
+    if not len(found.position):
+        return np.zeros(0)
+    variance = np.diagonal(image.covariance, axis1=1, axis2=2)
+    free = ~image.truncated
+    peak = -0.5 * np.where(free, np.log(2.0 * np.pi * variance), 0.0).sum(axis=1)
+    gain = pairings.log_odds + (peak - image.log_false)[pairings.box]
+    useful: Bools = gain > 0.0
+    if not useful.any():
+        return np.zeros(len(found.position))
+    pairings, gain = pairings.select(useful), gain[useful]
+    if len(place.ellipsoids) > MOST_OBJECTS:
+        return _score_near(place, pairings, gain, found)
+    return _score_all(place, pairings, gain, found)
+
+
+def _score_all(place: PlaceMap, pairings: Pairings, gain: Floats, found: Hypotheses) -> Floats:
+    """Compare each hypothesis with all pairings."""
+    box = pairings.box
+    half = np.exp(place.size[pairings.object_row, 0] - pairings.log_distance)
+    sigma_ray = np.hypot(_RAY_SIGMA, _RAY_SHARE * half)
+    first = np.flatnonzero(np.concatenate([[True], box[1:] != box[:-1]]))
+    score = np.zeros(len(found.position))
+    chunk = max(1, _MOST_CELLS // len(box))
+    for start in range(0, len(score), chunk):
+        part = slice(start, start + chunk)
+        rotation, position = found.rotation[part], found.position[part]
+        offset = np.einsum("hi,hij->hj", position, rotation)
+        inside = np.einsum("ni,hij->hnj", pairings.center, rotation) - offset[:, None, :]
+        distance = np.sqrt((inside**2).sum(axis=2))
+        cosine = (inside * pairings.ray).sum(axis=2) / distance
+        error = 2.0 * (1.0 - cosine) / sigma_ray**2
+        error += ((np.log(distance) - pairings.log_distance) / pairings.sigma) ** 2
+        own = np.maximum(gain - 0.5 * error, 0.0)
+        score[part] = np.maximum.reduceat(own, first, axis=1).sum(axis=1)
+    return score
+
+
+def _score_near(place: PlaceMap, pairings: Pairings, gain: Floats, found: Hypotheses) -> Floats:
+    """Compare each hypothesis with the objects before it."""
+    boxes, first, column = np.unique(pairings.box, return_index=True, return_inverse=True)
+    shape = len(place.ellipsoids), len(boxes)
+    gains, sigma = np.full(shape, -np.inf), np.ones(shape)
+    gains[pairings.object_row, column] = gain
+    sigma[pairings.object_row, column] = pairings.sigma
+    ray = pairings.ray[first]
+    log_half = place.size[pairings.object_row[first], 0] - pairings.log_distance[first]
+    sigma_ray = np.hypot(_RAY_SIGMA, _RAY_SHARE * np.exp(log_half))
+    score = np.zeros(len(found.position))
+    chunk = max(1, _MOST_CELLS // (MOST_OBJECTS * len(boxes)))
+    for start in range(0, len(score), chunk):
+        part = slice(start, start + chunk)
+        rotation, position = found.rotation[part], found.position[part]
+        ahead = position + _AHEAD * place.sensor.sight * rotation[:, :, 2]
+        _, rows = place.tree.query(ahead, k=MOST_OBJECTS)
+        inside = (place.ellipsoids[rows, :3] - position[:, None]) @ rotation
+        distance = np.sqrt((inside**2).sum(axis=2))
+        cosine = inside @ ray.T / distance[:, :, None]
+        error = 2.0 * (1.0 - cosine) / sigma_ray**2
+        apart = (np.log(distance) - place.size[rows, 0])[:, :, None] + log_half
+        error += (apart / sigma[rows]) ** 2
+        own = np.maximum(gains[rows] - 0.5 * error, 0.0)
+        score[part] = own.max(axis=1).sum(axis=1)
+    return score

@@ -1,0 +1,99 @@
+"""The search in maps of many objects leaves out no pair that agrees, and is bounded."""
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from dqslam.places import locate_quick
+from dqslam.places.locate_hypotheses import (
+    _MOST_COMPARED,
+    Hypotheses,
+    Pairings,
+    _agreeing_pairs,
+    _agrees,
+    _reaches,
+    _within_budget,
+)
+
+
+def strewn(random, boxes, objects, extent):
+    """Return pairings of each box with each object of a square."""
+    center = np.column_stack(
+        [random.uniform(0.0, extent, (objects, 2)), random.uniform(0.0, 1.0, objects)]
+    )
+    direction = np.column_stack([random.uniform(-0.6, 0.6, (boxes, 2)), np.ones(boxes)])
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    box, row = (part.ravel() for part in np.mgrid[:boxes, :objects])
+    usual = np.log(random.uniform(2.0, 7.0, boxes))
+    return Pairings(
+        box=box,
+        object_row=row,
+        ray=direction[box],
+        log_distance=usual[box] + random.normal(0.0, 0.2, objects)[row],
+        sigma=np.full(len(box), 0.15),
+        ray_sigma=np.full(len(box), 0.05),
+        log_odds=np.zeros(len(box)),
+        center=center[row],
+    )
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_no_pair_that_agrees_is_beyond_the_reach(seed):
+    pairings = strewn(np.random.default_rng(seed), boxes=5, objects=60, extent=15.0)
+    boxes = np.arange(5)
+    found = _agreeing_pairs(pairings, boxes, _reaches(pairings, boxes))
+    i, j = np.triu_indices(len(pairings), 1)
+    other = pairings.box[i] != pairings.box[j]
+    i, j = i[other], j[other]
+    distance = np.linalg.norm(pairings.center[i] - pairings.center[j], axis=1)
+    expected = np.column_stack([i, j])[_agrees(pairings, i, j, distance)]
+    assert len(expected) > 100
+    assert set(map(tuple, found.tolist())) == set(map(tuple, expected.tolist()))
+
+
+def test_boxes_are_left_out_until_few_enough_pairs_are_compared():
+    pairings = strewn(np.random.default_rng(1), boxes=10, objects=3000, extent=150.0)
+    boxes, reach = _within_budget(pairings, np.arange(10))
+    assert 3 <= len(boxes) < 10
+    trees = [cKDTree(pairings.center[pairings.box == one]) for one in boxes.tolist()]
+    pairs = [
+        trees[a].count_neighbors(trees[b], reach[a, b])
+        for a in range(len(boxes))
+        for b in range(a + 1, len(boxes))
+    ]
+    # At the border of the square there are fewer.
+    assert len(boxes) == 3 or 0.4 * _MOST_COMPARED < sum(pairs) < _MOST_COMPARED
+    few = strewn(np.random.default_rng(1), boxes=10, objects=30, extent=15.0)
+    assert len(_within_budget(few, np.arange(10))[0]) == 10
+
+
+def test_no_box_has_no_reach():
+    none = strewn(np.random.default_rng(0), boxes=1, objects=0, extent=1.0)
+    boxes, reach = _within_budget(none, np.zeros(0, dtype=np.int64))
+    assert (boxes.shape, reach.shape) == ((0,), (0, 0))
+
+
+def test_objects_near_a_hypothesis_score_as_all_do(monkeypatch):
+    """Where all objects are near, both ways of scoring are one."""
+    from types import SimpleNamespace
+
+    random = np.random.default_rng(2)
+    pairings = strewn(random, boxes=4, objects=50, extent=8.0)
+    rotation = np.linalg.qr(random.normal(size=(20, 3, 3)))[0]
+    found = Hypotheses(rotation, random.uniform(0.0, 8.0, (20, 3)))
+    center = pairings.center[:50]
+    log_half = -1.0
+    place = SimpleNamespace(
+        ellipsoids=np.hstack([center, np.zeros((50, 6))]),
+        tree=cKDTree(center),
+        size=np.column_stack([pairings.log_distance[:50] + log_half, np.full(50, 0.15)]),
+        sensor=SimpleNamespace(sight=5.0),
+    )
+    usual = pairings.log_distance.reshape(4, 50)
+    assert np.ptp(usual - usual[0], axis=1) == pytest.approx(np.zeros(4), abs=1e-12)
+    gain = random.uniform(1.0, 9.0, len(pairings))
+    every = locate_quick._score_all(place, pairings, gain, found)
+    monkeypatch.setattr(locate_quick, "MOST_OBJECTS", 50)
+    near = locate_quick._score_near(place, pairings, gain, found)
+    assert every.max() > 1.0
+    np.testing.assert_allclose(near, every, rtol=1e-9)
