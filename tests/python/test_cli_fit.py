@@ -127,6 +127,19 @@ def test_strict_refuses_what_a_run_only_doubts(folder, capsys):
     assert call("run", folder, *meters) == 0
 
 
+@pytest.mark.parametrize(("unit", "shown"), [(150, "3.5, 3.5"), (640, "0.82, 0.82")])
+def test_a_focal_length_in_other_units_stops_a_run(folder, capsys, unit, shown):
+    """Millimeters, or shares of the width."""
+    path = folder / "camera.json"
+    camera = json.loads(path.read_text())
+    path.write_text(json.dumps(camera | {"fx": camera["fx"] / unit, "fy": camera["fy"] / unit}))
+    message = f"image size: the focal length of {shown} px is too short for the image of 640 x 480"
+    assert call("run", folder) == 2
+    assert message in capsys.readouterr().err
+    assert call("inspect", folder, "--strict") == 3
+    assert message in " ".join(capsys.readouterr().out.split())
+
+
 def test_ids_mean_the_same_in_both_commands(folder, capsys):
     assert call("inspect", folder, "--ids", "none", "--json") == 0
     linked = capsys.readouterr().out
