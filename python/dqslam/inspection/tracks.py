@@ -32,8 +32,8 @@ def find_tracks(table: DetectionTable, ids: Ids | None) -> list[NDArray[np.int64
 
     Without ``ids``, boxes are joined by their overlap. If that finds almost nothing, because images
     are far apart, boxes of a class with one object are joined. Of two boxes of an object in a frame
-    the one with the better score counts. Of long recordings, parts are looked at. A file without ids
-    of tracks is a FileError if these are wanted.
+    the one with the better score counts. Of long recordings, parts are looked at. Ids of
+    tracks that the file does not have are a FileError.
     """
     rows = np.flatnonzero(table.score >= min(LEAST_SCORE, float(np.median(table.score))))
     rows = rows[_in_parts(table.frame[rows])]
