@@ -32,8 +32,8 @@ IMPOSSIBLE_SHARE, LEFT_SHARE = 0.05, 0.03
 LEAVING_SHARE, ROOM_SHARE = 0.015, 0.2
 # The distance by which trackers predict boxes beyond the image [share of the image].
 BEYOND = 0.02
-# The least focal length, as a share of the image's side. With the lens that bends most, equidistant,
-# the image would show 25 radians; without a lens, 171 degrees.
+# The least focal length, as a share of the image's side. With an equidistant lens, the image would
+# show 25 radians; without distortion, 171 degrees.
 SHORTEST_FOCAL = 0.04
 # The largest distance of a principal point from the middle of the image [share of the image].
 OFF_MIDDLE = 0.15
@@ -81,7 +81,7 @@ def check_image_size(evidence: Evidence) -> Finding | None:
         return Finding(
             "image size",
             f"the focal length of {camera.fx:.3g}, {camera.fy:.3g} px is too short for {image}: is "
-            "it in millimeters, or a share of the image? fx and fy of the camera file are in pixels",
+            "it in millimeters, or a share of the image? fx, fy of the camera file are in pixels",
         )
     if np.all((box >= -0.05) & (box <= 1.05)):
         return Finding(
