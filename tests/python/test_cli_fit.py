@@ -109,6 +109,50 @@ def test_millimeters_are_doubtful(folder, capsys):
     assert call("run", folder, "--ids", "track_id", "--length-scale", "0.001") == 0
 
 
+def test_strict_refuses_what_a_run_only_doubts(folder, capsys):
+    """The same files pass and fail as with `inspect --strict`."""
+    times, poses = read_trajectory(folder / "odometry.txt")
+    write_trajectory(folder / "odometry.txt", times, poses * [1e3, 1e3, 1e3, 1, 1, 1, 1])
+    assert call("inspect", folder, "--ids", "track_id", "--strict") == 3
+    capsys.readouterr()
+    assert call("run", folder, "--strict") == 2
+    shown = capsys.readouterr().err
+    assert "units: objects would be" in shown
+    assert "without --strict, the run goes on" in shown
+    assert not (folder / "out").exists()
+    assert call("run", folder, "--strict", "--force") == 2
+    assert "strict: cannot be combined with force" in capsys.readouterr().err
+    meters = ("--length-scale", "0.001", "--strict")
+    assert call("inspect", folder, "--ids", "track_id", *meters) == 0
+    assert call("run", folder, *meters) == 0
+
+
+@pytest.mark.parametrize(("unit", "shown"), [(150, "3.5, 3.5"), (640, "0.82, 0.82")])
+def test_a_focal_length_in_other_units_stops_a_run(folder, capsys, unit, shown):
+    """Millimeters, or shares of the width."""
+    path = folder / "camera.json"
+    camera = json.loads(path.read_text())
+    path.write_text(json.dumps(camera | {"fx": camera["fx"] / unit, "fy": camera["fy"] / unit}))
+    message = f"image size: the focal length of {shown} px is too short for the image of 640 x 480"
+    assert call("run", folder) == 2
+    assert message in capsys.readouterr().err
+    assert call("inspect", folder, "--strict") == 3
+    assert message in " ".join(capsys.readouterr().out.split())
+
+
+def test_ids_mean_the_same_in_both_commands(folder, capsys):
+    assert call("inspect", folder, "--ids", "none", "--json") == 0
+    linked = capsys.readouterr().out
+    assert call("inspect", folder, "--json") == 0
+    assert capsys.readouterr().out == linked
+    path = folder / "boxes.csv"
+    rows = [row.rsplit(",", 1)[0] for row in path.read_text().splitlines()]
+    path.write_text("\n".join(rows) + "\n")
+    for command in ("run", "inspect"):
+        assert call(command, folder, "--ids", "track_id") == 2
+        assert "boxes.csv:1: no column track_id (it has: frame, " in capsys.readouterr().err
+
+
 def test_times_of_boxes_are_shifted(folder):
     edit_boxes(folder, lambda table: table + [7.0, 0, 0, 0, 0])
     assert call("run", folder, "--ids", "track_id", "--time-offset", "-7") == 0

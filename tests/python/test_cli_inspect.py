@@ -71,6 +71,16 @@ def test_printed_and_strict(files, capsys):
     assert call(files, "--ids", "track_id", "--strict") == 3
 
 
+def test_boxes_of_one_image_tell_nothing_of_the_clock(files, capsys):
+    lines = files[2].read_text().splitlines(keepends=True)
+    files[2].write_text("".join([lines[0], *(line for line in lines if line.startswith("7,"))]))
+    assert call(files, "--json") == 0
+    content = json.loads(capsys.readouterr().out)
+    assert (content["detections"]["boxes"], content["detections"]["frames"]) == (4, 1)
+    assert content["unchecked"]["clock"] == "all boxes are of one time"
+    assert content["clock"] is content["fit"] is None
+
+
 @pytest.mark.parametrize(
     ("more", "message"),
     [

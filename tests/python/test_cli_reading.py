@@ -42,6 +42,24 @@ def test_a_bad_box_is_said_and_in_the_report(files, tmp_path, capsys):
     assert_one_line_of_error(capsys, "boxes.csv:11: empty box")
 
 
+@pytest.mark.parametrize(
+    ("order", "message"),
+    [
+        ((0, 2, 1), "boxes.csv: looks like boxes, not like a trajectory: are two files exchanged?"),
+        ((0, 0, 2), "camera.json: looks like a camera, not like a trajectory"),
+        ((1, 1, 2), "traj.txt: looks like a trajectory, not like a camera"),
+        ((0, 1, 1), "traj.txt: looks like a trajectory, not like boxes"),
+    ],
+)
+@pytest.mark.parametrize("more", [(), ("--frame-rate", "10")])
+def test_files_that_are_exchanged_are_named(files, tmp_path, capsys, order, message, more):
+    exchanged = [files[index] for index in order]
+    assert call("inspect", exchanged, *more) == 2
+    assert_one_line_of_error(capsys, message)
+    assert call("run", exchanged, "--out", str(tmp_path / "out"), *more) == 2
+    assert_one_line_of_error(capsys, message)
+
+
 def test_inspect_says_it_too(files, capsys):
     assert call("inspect", files, "--strict") == 0
     edit(files[2], spoil)

@@ -69,6 +69,16 @@ def test_what_a_header_leaves_open_is_noted(tmp_path):
             "the header gives tx in in, not one",
         ),
         ("t,tx,ty,tz,qx,qy,qz,qw\n5,1,2,3,0,0,0.8\n", r":2: 7 fields, not 8"),
+        (
+            "timestamp x y z roll pitch yaw\n5 1 2 3 0 0 0.8\n",
+            "its header has no qx, qy, qz, qw, but roll, pitch, yaw: angles are not read",
+        ),
+        ("# time x y theta\n5 1 2 0.8\n", "its header has no tz, qx, .*, but theta: angles"),
+        ("t;x;y;z;rx;ry;rz\n5;1;2;3;0;0;0.8\n", "no qx, qy, qz, qw, but rx, ry, rz"),
+        # Without a header, eight numbers are a trajectory unless they begin as boxes of MOT do.
+        ("0.5 1.25 2 3 0 0 2.4 1.8\n", r":1: quaternion has length 3, not 1"),
+        ("0.5,1.25,2,3,0,0,240,180\n", r":1: quaternion has length 300, not 1"),
+        ("5 1 200 300 40 30 240 180\n", "trajectory in no known format"),
     ],
 )
 def test_a_header_that_does_not_fit(tmp_path, text, message):

@@ -24,13 +24,19 @@ FOUND = 3  # exit code of --strict
 def inspect(
     files: RecordingOptions,
     ids: Annotated[
-        Literal["track_id", "class_id"] | None,
-        typer.Option(help="Column with the ids of objects. Default: boxes are linked by overlap."),
-    ] = None,
+        Literal["none", "track_id", "class_id"],
+        typer.Option(
+            metavar="SOURCE",
+            help="Where the ids of objects come from, as for run; with none, boxes are linked by "
+            "their overlap.",
+        ),
+    ] = "none",
     strict: Annotated[
         bool,
         typer.Option(
-            "--strict", help=f"Exit with {FOUND} if there are warnings, or bad boxes or poses."
+            "--strict",
+            help=f"Exit with {FOUND} if there is a warning or any bad box or pose, which run "
+            "--strict refuses.",
         ),
     ] = False,
     config: ConfigFile = None,
@@ -59,7 +65,8 @@ def inspect(
         table = io.read_boxes_file(detections, size, reading, notes, trajectory=path, check=False)
         done()
         latest = reading.max_time_difference
-        inspection = inspect_recording(lens, path, table, ids=ids, max_time_difference=latest)
+        linked = None if ids == "none" else ids
+        inspection = inspect_recording(lens, path, table, ids=linked, max_time_difference=latest)
     _show(output, inspection, notes)
     if strict and (inspection.findings or notes.has_bad):
         raise typer.Exit(FOUND)

@@ -35,7 +35,12 @@ def run(
         float, typer.Option(help="Leave out boxes with a lower score, 0 to 1.")
     ] = 0.5,
     strict: Annotated[
-        bool, typer.Option("--strict", help="Refuse any bad box or pose, as --max-bad 0 does.")
+        bool,
+        typer.Option(
+            "--strict",
+            help="Refuse files with any bad box or pose, as --max-bad 0 does, and files of which "
+            "the checks of inspect warn.",
+        ),
     ] = False,
     ids: Annotated[
         Literal["none", "track_id", "class_id"],
@@ -180,6 +185,7 @@ def run(
         extras=io.Extras(positions=positions, absolute=absolute, closures=closures),
         reading=replace(reading, max_bad=0.0) if strict else reading,
         force=force,
+        strict=strict,
         added_noise=added,
         odometry_noise=believed,
         odometry_covariance=odometry_covariance,

@@ -148,8 +148,8 @@ def _step(evidence: Evidence) -> float:
     """
     interval = float(np.median(np.diff(evidence.trajectory.timestamps)))
     images = np.diff(np.unique(evidence.table.timestamp))
-    if not len(images):
-        raise NotEnoughDataError("all boxes are of one image")
+    if not images.size:
+        raise NotEnoughDataError("all boxes are of one time")
     return interval * max(1, round(0.5 * float(np.median(images)) / interval))
 
 

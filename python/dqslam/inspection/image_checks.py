@@ -32,6 +32,9 @@ IMPOSSIBLE_SHARE, LEFT_SHARE = 0.05, 0.03
 LEAVING_SHARE, ROOM_SHARE = 0.015, 0.2
 # The distance by which trackers predict boxes beyond the image [share of the image].
 BEYOND = 0.02
+# The least focal length, as a share of the image's side. With an equidistant lens, the image would
+# show 25 radians; without distortion, 171 degrees.
+SHORTEST_FOCAL = 0.04
 # The largest distance of a principal point from the middle of the image [share of the image].
 OFF_MIDDLE = 0.15
 # Boxes that end together but begin at different places: the least number of beginnings, the least
@@ -64,7 +67,7 @@ def check_image_size(evidence: Evidence) -> Finding | None:
 
     Boxes of a larger image leave this one. Boxes of a smaller image pile up at its border, within
     this one. The principal point for another size is far from the middle. Rays meet better if boxes
-    are of the right image.
+    are of the right image. A focal length in millimeters is far shorter than any lens has.
     """
     camera, box = evidence.camera, _scored(evidence)
     size = np.array([camera.width, camera.height])
@@ -73,6 +76,13 @@ def check_image_size(evidence: Evidence) -> Finding | None:
     beyond = float(np.mean(np.any(box[:, 2:] > size * (1 + BEYOND), axis=1)))
     border = border_within(evidence)
     why = None
+    focal = np.array([camera.fx, camera.fy])
+    if np.any(focal < SHORTEST_FOCAL * size):
+        return Finding(
+            "image size",
+            f"the focal length of {camera.fx:.3g}, {camera.fy:.3g} px is too short for {image}: is "
+            "it in millimeters, or a share of the image? fx, fy of the camera file are in pixels",
+        )
     if np.all((box >= -0.05) & (box <= 1.05)):
         return Finding(
             "image size",

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dqslam.io import DetectionTable
+from dqslam.io.recording import object_ids
 
 Ids = Literal["track_id", "class_id"]
 
@@ -31,14 +32,14 @@ def find_tracks(table: DetectionTable, ids: Ids | None) -> list[NDArray[np.int64
 
     Without ``ids``, boxes are joined by their overlap. If that finds almost nothing, because images
     are far apart, boxes of a class with one object are joined. Of two boxes of an object in a frame
-    the one with the better score counts. Of long recordings, parts are looked at.
+    the one with the better score counts. Of long recordings, parts are looked at. Ids of
+    tracks that the file does not have are a FileError.
     """
     rows = np.flatnonzero(table.score >= min(LEAST_SCORE, float(np.median(table.score))))
     rows = rows[_in_parts(table.frame[rows])]
     rows = rows[~doubles(table, rows)]
     if ids is not None:
-        column = table.class_id if ids == "class_id" else table.track_id
-        return [] if column is None else _grouped(table, rows, column[rows])
+        return _grouped(table, rows, object_ids(table, ids)[rows])
     tracks = _grouped(table, rows, overlap_ids(table, rows))
     if len(tracks) >= FEWEST_TRACKS:
         return tracks

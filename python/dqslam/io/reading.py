@@ -17,7 +17,7 @@ from dqslam.io.formats import Progress, no_progress
 from dqslam.io.frames import FrameTimes
 from dqslam.io.notes import MAX_BAD, Notes
 from dqslam.io.readings import AS_USUAL, Readings
-from dqslam.io.sources import FormatNames, choose_frame_times, topic_of
+from dqslam.io.sources import FormatNames, choose_frame_times, format_of, topic_of
 from dqslam.io.trajectory import Trajectory, read_trajectory
 from dqslam.io.trajectory.rosbag import KINDS as TRAJECTORIES
 
@@ -73,7 +73,7 @@ def read_camera_file(path: str | Path, options: ReadOptions) -> _core.Camera:
     """Read the camera of a recording."""
     return read_camera(
         path,
-        options.formats.camera,
+        format_of(path, "camera", options.formats).name,
         topic=topic_of(path, (CAMERA_INFO,), options.topics),
         camera_id=options.camera_id,
         image_size=options.image_size,
@@ -86,7 +86,7 @@ def read_path_file(
     """Read the trajectory of the camera of a recording, in meters."""
     trajectory = read_trajectory(
         path,
-        options.formats.trajectory,
+        format_of(path, "trajectory", options.formats).name,
         frames=options.frames,
         has_mount=options.readings.body_from_camera is not None,
         topic=topic_of(path, TRAJECTORIES, options.topics),
@@ -120,7 +120,7 @@ def read_boxes_file(
     width, height = size or (None, None)
     table = read_detections(
         path,
-        options.formats.detections,
+        format_of(path, "detections", options.formats).name,
         width=width,
         height=height,
         frames=options.frames,

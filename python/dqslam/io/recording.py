@@ -150,7 +150,7 @@ def load_recording(
         own.warn()
     if examine is not None:
         examine(lens, trajectory, table)
-    object_id = _object_ids(table, ids)
+    object_id = object_ids(table, ids)
     covariance = (odometry_noise or OdometryNoise()).covariance(len(path) - 1)
     if odometry_covariance is not None:
         covariance = read_step_covariances(odometry_covariance, pose_times)
@@ -208,7 +208,16 @@ def _between_poses(
     return np.unique(times[usual & (late > NEAR_SHARE * interval)])
 
 
-def _object_ids(table: DetectionTable, ids: Ids) -> NDArray[np.int64]:
+def object_ids(table: DetectionTable, ids: Ids) -> NDArray[np.int64]:
+    """Return the id of the object of each box, shape (m,), -1 without one; with "none" all are -1.
+
+    Raises
+    ------
+    FileError
+        If the file has no ids of tracks, and these are wanted.
+    ValueError
+        If ``ids`` is none of the three.
+    """
     if ids == "none":
         return np.full(len(table), -1, dtype=np.int64)
     if ids == "class_id":

@@ -5,13 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from dqslam._input import exists, refuse_shared_input
 from dqslam.io.camera import CAMERA_FORMATS
 from dqslam.io.detections import DETECTION_FORMATS
 from dqslam.io.files import FileError, read_rows, read_text
-from dqslam.io.formats import choose_format, guarded, look_at
+from dqslam.io.formats import Format, choose_format, guarded, look_at
 from dqslam.io.frames import BY_NUMBER, FrameTimes
 from dqslam.io.rosbag import bag_topics, looks_like_bag
 from dqslam.io.trajectory import TRAJECTORY_FORMATS
@@ -31,16 +31,13 @@ class FormatNames(NamedTuple):
 
 
 BY_LOOK = FormatNames()
-KINDS = dict(
-    zip(
-        FormatNames._fields,
-        (
-            [format_.name for format_ in formats]
-            for formats in (CAMERA_FORMATS, TRAJECTORY_FORMATS, DETECTION_FORMATS)
-        ),
-        strict=True,
-    )
-)
+PHRASES = {"camera": "a camera", "trajectory": "a trajectory", "detections": "boxes"}
+FORMATS: dict[str, Sequence[Format[Any]]] = {
+    "camera": CAMERA_FORMATS,
+    "trajectory": TRAJECTORY_FORMATS,
+    "detections": DETECTION_FORMATS,
+}
+KINDS = {kind: [format_.name for format_ in formats] for kind, formats in FORMATS.items()}
 
 
 def split_formats(names: Sequence[str]) -> FormatNames:
@@ -65,6 +62,27 @@ def split_formats(names: Sequence[str]) -> FormatNames:
     return FormatNames(**chosen)
 
 
+def format_of(path: str | Path, kind: str, formats: FormatNames = BY_LOOK) -> Format[Any]:
+    """Choose the format of a file that should be a camera, a trajectory or detections.
+
+    Raises
+    ------
+    FileError
+        If it is in no format of this kind; the error says which kind it looks like instead.
+    """
+    try:
+        return choose_format(path, getattr(formats, kind), FORMATS[kind], kind)
+    except FileError as error:
+        try:
+            other = kind_of(path)
+        except FileError:
+            raise error from None
+        if other is None or other == kind:
+            raise
+        message = f"looks like {PHRASES[other]}, not like {PHRASES[kind]}"
+        raise FileError(path, f"{message}: are two files exchanged?") from None
+
+
 def choose_frame_times(
     odometry: str | Path,
     detections: str | Path,
@@ -76,8 +94,8 @@ def choose_frame_times(
     the result is None: the boxes have times of their own, or reading them raises an error.
     """
     refuse_shared_input(odometry, detections)
-    path = choose_format(odometry, formats.trajectory, TRAJECTORY_FORMATS, "trajectory")
-    boxes = choose_format(detections, formats.detections, DETECTION_FORMATS, "detections")
+    path = format_of(odometry, "trajectory", formats)
+    boxes = format_of(detections, "detections", formats)
     timed = guarded(odometry, path.name, path.has_times, Path(odometry))
     return None if timed or boxes.name == "rosbag" else BY_NUMBER
 
@@ -114,11 +132,7 @@ def kind_of(path: str | Path) -> str | None:
         return None
     if look.suffix == ".json":
         return "camera" if CAMERA_KEYS.search(read_text(path)) else "detections"
-    for kind, formats in (
-        ("camera", CAMERA_FORMATS),
-        ("trajectory", TRAJECTORY_FORMATS),
-        ("detections", DETECTION_FORMATS),
-    ):
+    for kind, formats in FORMATS.items():
         if any(guarded(path, one.name, one.recognize, look) for one in formats):
             return kind
     if look.path.is_file():

@@ -79,6 +79,8 @@ def run_files(
     8
     """
     options = options or RunFilesOptions()
+    if options.strict and options.force:
+        raise ValueError("strict: cannot be combined with force, which goes on in spite of it")
     _check_extras(options)
     inputs = (
         *(camera, odometry, detections, groundtruth, options.odometry_covariance),
@@ -204,11 +206,14 @@ def _examine(
     ids = None if options.ids == "none" or options.trust_ids != FINAL else options.ids
     latest = options.reading.max_time_difference
     findings, notes = first_findings(camera, trajectory, table, ids=ids, max_time_difference=latest)
-    fatal = [str(finding) for finding in findings if finding.check in FATAL]
+    fatal = [str(one) for one in findings if options.strict or one.check in FATAL]
     if fatal and not options.force:
+        way_on = "without --strict, the run goes on" if options.strict else "--force goes on"
+        if options.strict and any(one.check in FATAL for one in findings):
+            way_on = "--force instead of --strict goes on"
         raise ValueError(
             f"the files do not fit together: {'; '.join(fatal)}. `dqslam inspect` tells more, "
-            "--force goes on"
+            f"{way_on}"
         )
     return [str(finding) for finding in findings], notes
 

@@ -63,6 +63,9 @@ class RunFilesOptions(RunOptions):
     times of frames, their numbers are seconds where the trajectory counts frames, too."""
     force: bool = False
     """Whether to go on if poses and boxes do not fit together, or would in another reading."""
+    strict: bool = False
+    """Whether every warning of the checks of the files refuses them, not only of what makes no map.
+    Bad records are refused with ``ReadOptions(max_bad=0)``."""
     added_noise: OdometryNoise | None = None
     """Noise to add to every step of the odometry, drawn with ``seed``."""
     odometry_noise: OdometryNoise | None = None

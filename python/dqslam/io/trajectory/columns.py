@@ -17,20 +17,12 @@ from dqslam.io.files import FileError, parse_floats, read_rows, read_text
 from dqslam.io.formats import ReadContext
 from dqslam.io.notes import Notes
 from dqslam.io.times import parse_times
-from dqslam.io.trajectory.header import FIELDS, Header, find_header, unit_of
+from dqslam.io.trajectory.header import FIELDS, Header, find_header, split_row, unit_of
 from dqslam.io.trajectory.table import Trajectory, make_trajectory
 
 PLAIN = Header(dict(zip(FIELDS, range(8), strict=True)), {}, len(FIELDS), ())
 WITH_ID = 9  #: columns of RTAB-Map's poses without a header, the last one the id of the node
 SILENT = ("id", "node_id", "frame", "seq", "")  #: more columns that say nothing about the pose
-
-
-def split_row(row: str) -> list[str]:
-    """Split a line at commas, semicolons or tabs, or else at spaces."""
-    separator = next((one for one in (",", ";", "\t") if one in row), None)
-    return (
-        [cell.strip() for cell in row.split(separator)] if separator in (",", ";") else row.split()
-    )
 
 
 def read_columns(path: str | Path, context: ReadContext) -> Trajectory:
@@ -47,7 +39,9 @@ def read_columns(path: str | Path, context: ReadContext) -> Trajectory:
         raise FileError(path, "holds no poses, only a header")
     missing = [name for name in FIELDS if name not in header.columns]
     if missing:
-        raise FileError(path, f"its header has no {', '.join(missing)}")
+        angles = ", ".join(header.angles)
+        instead = f", but {angles}: angles are not read, quaternions are" if angles else ""
+        raise FileError(path, f"its header has no {', '.join(missing)}{instead}")
     cells = [split_row(row) for row in rows]
     count, others = header.count, header.others
     if header is PLAIN and len(cells[0]) == WITH_ID:

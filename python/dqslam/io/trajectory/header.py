@@ -28,6 +28,16 @@ TIME_UNITS = {"_ns": "ns", "_us": "us", "_ms": "ms", "_nsec": "ns"}
 FIELDS_W_FIRST = ("t", "tx", "ty", "tz", "qw", "qx", "qy", "qz")
 W_FIRST = re.compile(r"(?i)\bw ?,? ?x ?,? ?y ?,? ?z\b|\bw[- ]first\b")
 QUATERNION = {"qx", "qy", "qz", "qw"}
+# A header that has these instead of a quaternion is one as well: the error says what is missing.
+ANGLES = {"roll", "pitch", "yaw", "theta", "heading", "rx", "ry", "rz", "phi", "psi"}
+
+
+def split_row(row: str) -> list[str]:
+    """Split a line at commas, semicolons or tabs, or else at spaces."""
+    separator = next((one for one in (",", ";", "\t") if one in row), None)
+    return (
+        [cell.strip() for cell in row.split(separator)] if separator in (",", ";") else row.split()
+    )
 
 
 @dataclass(frozen=True)
@@ -38,6 +48,7 @@ class Header:
     units: dict[str, str]
     count: int  #: number of columns
     others: tuple[str, ...]  #: names that mean nothing here
+    angles: tuple[str, ...] = ()  #: those of them that are angles, without a quaternion beside them
     words: bool = False  #: whether these may be words after the names, and no columns
 
 
@@ -66,7 +77,7 @@ def _meaning(bare: str) -> str | None:
 def parse_header(text: str) -> Header | None:
     """Return the header that a comment or row is, or None if it is none.
 
-    It may be separated by commas, semicolons, or spaces.
+    It may be separated by commas, semicolons, or spaces. It names a quaternion, or angles.
     """
     text = text.strip().lstrip("#%/").strip()
     # There are at least seven names, and a word or two may have commas.
@@ -75,7 +86,8 @@ def parse_header(text: str) -> Header | None:
     names = text.split(separator) if separator else re.sub(r"\s+[\[(]", "[", text).split()
     columns: dict[str, int] = {}
     units: dict[str, str] = {}
-    others = []
+    others: list[str] = []
+    angles: list[str] = []
     for place, name in enumerate(names):
         bare = re.sub(r"[^a-z0-9]+", "_", re.sub(r"[\[(].*", "", name.strip().lower())).strip("_")
         unit = re.search(r"[\[(]\s*([a-z]*)\s*[\])]", name.strip().lower())
@@ -86,10 +98,14 @@ def parse_header(text: str) -> Header | None:
         meaning = _meaning(bare)
         if meaning is None or meaning in columns:
             others.append(name.strip())
+            if bare.split("_")[0] in ANGLES:
+                angles.append(name.strip())
         else:
             columns[meaning], units[meaning] = place, given
     if len(QUATERNION & set(columns)) < len(QUATERNION):
-        return None
+        if not angles or not {"t", "tx", "ty"} <= set(columns):
+            return None
+        return Header(columns, units, len(names), tuple(others), tuple(angles))
     return Header(columns, units, len(names), tuple(others))
 
 
@@ -100,7 +116,7 @@ def find_header(comments: Sequence[str], first: str) -> Header | None:
         return header
     for text in reversed(comments):
         header = parse_header(text)
-        if header is not None:
+        if header is not None and (not header.angles or len(split_row(first)) == header.count):
             return _without_words(header)
     if any(W_FIRST.search(text) for text in comments):
         columns = dict(zip(FIELDS_W_FIRST, range(len(FIELDS)), strict=True))

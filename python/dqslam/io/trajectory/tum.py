@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike
 
 from dqslam.io.files import in_reach, write_text
 from dqslam.io.formats import Format, Look
-from dqslam.io.trajectory.columns import WITH_ID, read_columns, split_row
-from dqslam.io.trajectory.header import FIELDS, find_header
+from dqslam.io.trajectory.columns import WITH_ID, read_columns
+from dqslam.io.trajectory.header import FIELDS, find_header, split_row
 
 LONGEST = 2.0  #: of four numbers that may be a quaternion; width and height of boxes are longer
 
@@ -46,7 +46,10 @@ def _looks(look: Look) -> bool:
         return "," not in look.first and len(cells) == len(FIELDS) and not cells[1][0].isupper()
     if "," in look.first and cells[0].isdigit():
         return False  # EuRoC's, with w first, or frames of MOT
-    # Boxes of MOT have as many numbers, and the first is a whole one as well.
+    # Boxes of MOT have as many numbers, but the first two, frame and id, are whole ones. If the
+    # numbers of a trajectory are no quaternion, its error says so.
+    if len(cells) == len(FIELDS) and any(value % 1 for value in values[:2]):
+        return True
     length = np.linalg.norm(in_reach(np.array(values[4:8])))
     may_turn = not np.isfinite(length) or length <= LONGEST
     return bool(may_turn) and (len(cells) == len(FIELDS) or cells[8].isdigit())
