@@ -51,6 +51,31 @@ Vector9d TurnTangent(const Matrix3d& L, const Vector3d& rotation) {
   return tangent;
 }
 
+// A viewer that moves, and what it carries with it.
+struct Carrier {
+  Rigid<double> before, after;
+  Vector3d shift, turn;  // the tangent, in the world
+
+  /// The change of a center, to first order.
+  Vector3d ChangeOf(const Vector3d& center) const {
+    return shift + turn.cross(center - before.translation);
+  }
+  Matrix3d Rotation() const { return after.rotation * before.rotation.transpose(); }
+  Vector3d Move(const Vector3d& center) const {
+    return after.translation + Rotation() * (center - before.translation);
+  }
+};
+
+template <typename Pose>
+Carrier CarrierOf(const MovedPose& viewer) {
+  const Rigid<double> before = Pose::template WorldFromRobot<double>(viewer.before);
+  const Twist twist = InSpace<Pose>(viewer.tangent);
+  return {before,
+          Pose::template WorldFromRobot<double>(viewer.after),
+          before.rotation * twist.translation,
+          before.rotation * twist.rotation};
+}
+
 }  // namespace
 
 // Let z be the pose relative to the previous one.  T' = T (1 + tangent) of both poses gives, to
@@ -77,24 +102,17 @@ bool PlusBeside(const MovedPose& viewer,
                 const double* ellipsoid,
                 const double* tangent,
                 double* moved) {
-  const Rigid<double> before = Pose::template WorldFromRobot<double>(viewer.before);
-  const Rigid<double> after = Pose::template WorldFromRobot<double>(viewer.after);
-  const Twist twist = InSpace<Pose>(viewer.tangent);
-  const Vector3d turn = before.rotation * twist.rotation;
-  const Vector3d arm = Vector3d(ellipsoid) - before.translation;
+  const Carrier carrier = CarrierOf<Pose>(viewer);
   Vector9d change = Eigen::Map<const Vector9d>(tangent) -
-                    TurnTangent(Unpacked<EllipsoidModel>(ellipsoid).factor, turn);
-  change.head<3>() -= before.rotation * twist.translation + turn.cross(arm);
+                    TurnTangent(Unpacked<EllipsoidModel>(ellipsoid).factor, carrier.turn);
+  change.head<3>() -= carrier.ChangeOf(Vector3d(ellipsoid));
   Vector9d changed;
   if (!EllipsoidManifold().Plus(ellipsoid, change.data(), changed.data())) return false;
 
-  const Matrix3d after_from_before = after.rotation * before.rotation.transpose();
-  const Unpacked<EllipsoidModel> straight(changed.data());
-  const Matrix3d turned = after_from_before * straight.factor;
+  const Matrix3d turned = carrier.Rotation() * Unpacked<EllipsoidModel>(changed.data()).factor;
   const Eigen::LLT<Matrix3d> cholesky(turned * turned.transpose());
   const Matrix3d L = cholesky.matrixL();
-  Eigen::Map<Vector9d>(moved, kLandmarkSize)
-      << after.translation + after_from_before * (changed.head<3>() - before.translation),
+  Eigen::Map<Vector9d>(moved, kLandmarkSize) << carrier.Move(changed.head<3>()),
       L.diagonal().array().log(), L(1, 0), L(2, 0), L(2, 1);
   return cholesky.info() == Eigen::Success;
 }
@@ -112,22 +130,16 @@ bool PlusBodyBeside(const MovedPose& viewer,
                     const double* body,
                     const double* tangent,
                     double* moved) {
-  const Rigid<double> before = Pose::template WorldFromRobot<double>(viewer.before);
-  const Rigid<double> after = Pose::template WorldFromRobot<double>(viewer.after);
-  const Twist twist = InSpace<Pose>(viewer.tangent);
-  const Vector3d turn = before.rotation * twist.rotation;
-  const Vector3d arm = Vector3d(body) - before.translation;
+  const Carrier carrier = CarrierOf<Pose>(viewer);
   const Unpacked<BodyModel> unpacked(BodyModel(), body);  // as a frame, of any shape
   Vector9d change = Eigen::Map<const Vector9d>(tangent);
-  change.head<3>() -= before.rotation * twist.translation + turn.cross(arm);
-  change.tail<3>() -= unpacked.by_vector.inverse() * (unpacked.rotation.transpose() * turn);
+  change.head<3>() -= carrier.ChangeOf(Vector3d(body));
+  change.tail<3>() -= unpacked.by_vector.inverse() * (unpacked.rotation.transpose() * carrier.turn);
   Vector9d changed;
   if (!PlusBody(body, change.data(), changed.data())) return false;
-  const Matrix3d after_from_before = after.rotation * before.rotation.transpose();
-  const Eigen::AngleAxisd turned(after_from_before *
+  const Eigen::AngleAxisd turned(carrier.Rotation() *
                                  Unpacked<BodyModel>(BodyModel(), changed.data()).rotation);
-  Eigen::Map<Vector9d>(moved, kLandmarkSize)
-      << after.translation + after_from_before * (changed.head<3>() - before.translation),
+  Eigen::Map<Vector9d>(moved, kLandmarkSize) << carrier.Move(changed.head<3>()),
       changed.segment<3>(3), turned.angle() * turned.axis();
   return true;
 }
