@@ -23,8 +23,8 @@ using Eigen::Vector3d;
 // half squared sigmas.
 constexpr double kEvidence = 5;
 // Another candidate must be better by this.
-constexpr double kBetter = 0.5;
-constexpr int kRounds = 5;
+constexpr double kBetter = 0.05;
+constexpr int kRounds = 8;
 constexpr int kYaws = 6;   // rotations about the vertical, within a quarter turn
 constexpr int kTries = 4;  // starts that are minimized from, of all that are compared
 constexpr int kIterations = 30;
