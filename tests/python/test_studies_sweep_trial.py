@@ -42,8 +42,16 @@ def test_a_file_has_a_word_for_each_option_of_the_solver():
         "input",
         "box_noise",
         "size_prior",
+        "shape",
     }
     assert names <= type(settings().estimator).model_fields.keys()
+
+
+def test_the_shape_of_the_estimate_is_a_setting():
+    assert settings().assumptions().shape == "ellipsoid"
+    assert settings(shape="cuboid").assumptions().shape == "cuboid"
+    with pytest.raises(ValueError, match="no shapes but its quadrics"):
+        settings(method="paper", algebraic_sigma=1e10, shape="cuboid")
 
 
 def test_wrong_ids_have_a_robust_loss_unless_another_is_chosen():

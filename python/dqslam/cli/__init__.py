@@ -48,7 +48,7 @@ EXIT_CODES = {
     1: "a mistake in dqslam itself; its traceback is shown",
     2: "bad input: options, files, or a problem that they do not determine",
     3: "done, but the result of `run` is doubtful, `inspect --strict` has found a mistake, or "
-    "maps do not say whether they are of one place",
+    "maps do not say whether they are of one place, or how they lie to each other",
     130: "stopped by Ctrl-C",
     141: "stopped, because the reader of its output has gone",
 }

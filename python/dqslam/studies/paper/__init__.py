@@ -7,6 +7,7 @@ from dqslam.studies.paper.methods import LossName as LossName
 from dqslam.studies.paper.methods import Method as Method
 from dqslam.studies.paper.methods import RowName as RowName
 from dqslam.studies.paper.methods import Settings as Settings
+from dqslam.studies.paper.methods import ShapeName as ShapeName
 from dqslam.studies.paper.methods import assumptions_of as assumptions_of
 from dqslam.studies.paper.methods import default_loss as default_loss
 from dqslam.studies.paper.methods import method_options as method_options

@@ -16,6 +16,7 @@ from dqslam.studies.paper import (
     Method,
     RowName,
     Settings,
+    ShapeName,
     assumptions_of,
     default_loss,
     method_options,
@@ -48,6 +49,8 @@ class _Estimator(_Settings):
     """Whether the estimator gets boxes alone, or also measured positions of the objects."""
     box_noise: BoxNoiseSettings | None = None
     size_prior: SizePriorSettings | None = None
+    shape: ShapeName = "ellipsoid"
+    """The shape of the objects in the estimate."""
 
 
 def _solver_settings() -> dict[str, Any]:
@@ -78,7 +81,7 @@ class TrialSettings(_Settings):
 
     @model_validator(mode="after")
     def _method_has_what_it_needs(self) -> Self:
-        Settings(self.estimator.method, self._loss, self.bound)
+        Settings(self.estimator.method, self._loss, self.bound, self.estimator.shape)
         if self.estimator.method == "paper" and self._solver("algebraic_sigma") is None:
             raise ValueError(
                 "estimator.algebraic_sigma is missing: the method of the paper has no default; "
@@ -112,13 +115,15 @@ class TrialSettings(_Settings):
 
     def assumptions(self) -> Assumptions:
         """Return the assumptions about boxes and objects."""
-        default = assumptions_of(self.scenario, Settings(self.estimator.method, bound=self.bound))
+        chosen = Settings(self.estimator.method, bound=self.bound, shape=self.estimator.shape)
+        default = assumptions_of(self.scenario, chosen)
         noise, prior = self.estimator.box_noise, self.estimator.size_prior
         return Assumptions(
             default.box_noise if noise is None else BoxNoise(noise.pixels, noise.relative),
             default.size_prior
             if prior is None
             else SizePrior(float(np.log(prior.median_m)), float(np.log(prior.spread))),
+            default.shape,
         )
 
     def in_full(self) -> dict[str, Any]:
