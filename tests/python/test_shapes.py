@@ -1,6 +1,7 @@
 """Cuboids and cylinders from Python: told or found, their sizes, volumes and covariances."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -90,6 +91,31 @@ def test_a_state_has_a_shape_for_each_object(solved: tuple[dq.Graph, dq.Estimate
     everywhere = [dq.Shape.AUTO] * len(estimate.object_ids)
     with pytest.raises(ValueError, match="a state has no AUTO"):
         dq.solve(graph, start=dq.State(estimate.poses, estimate.landmarks, everywhere))
+
+
+def test_what_knows_ellipsoids_only_refuses_shapes(solved: tuple[dq.Graph, dq.Estimate]) -> None:
+    graph, estimate = solved
+    needs = "shapes: cuboids and cylinders need the ellipsoid model"
+    with pytest.raises(ValueError, match=needs):
+        dq.solve(graph, dq.SolveOptions(landmark_model=dq.LandmarkModel.DUAL_QUADRIC))
+    with pytest.raises(ValueError, match=needs):
+        dq.solve(graph, dq.SolveOptions(residual=dq.Residual.BOX))
+    with pytest.raises(ValueError, match="calibration: all objects must be ellipsoids"):
+        dq.check_calibration(graph, estimate)
+
+
+def test_a_saved_body_has_the_sigmas_of_its_lengths(
+    tmp_path: Path, solved: tuple[dq.Graph, dq.Estimate]
+) -> None:
+    graph, estimate = solved
+    marginals = dq.marginal_covariances(graph, estimate)
+    dq.save_estimate(estimate, tmp_path / "out", marginals=marginals)
+    saved = dq.load_results(tmp_path / "out").objects
+    of_lengths = np.sqrt(np.diagonal(marginals.objects, axis1=1, axis2=2)[:, 3:6])
+    order = np.argsort(-estimate.half_lengths, axis=1)
+    np.testing.assert_allclose(
+        saved.log_semi_axes_sigmas, np.take_along_axis(of_lengths, order, axis=1), rtol=1e-6
+    )
 
 
 def test_the_paper_is_told_true_sigmas_where_its_objects_have_their_own_shape() -> None:

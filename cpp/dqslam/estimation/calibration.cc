@@ -194,6 +194,9 @@ CalibrationScore ScoreCalibration(const Graph& graph,
                                   const State& state,
                                   const VectorXd& timestamps) {
   CheckTimestamps(graph, timestamps);
+  if (!AreEllipsoids(graph.shapes)) {
+    throw std::invalid_argument("calibration: all objects must be ellipsoids, without shapes");
+  }
   if (options.landmark_model != LandmarkModel::kEllipsoid) {
     throw std::invalid_argument("calibration: only ellipsoids have exact boxes");
   }

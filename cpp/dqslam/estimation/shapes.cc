@@ -140,7 +140,7 @@ class ShapeFitter {
     return candidate;
   }
 
-  // The best start at each of some rotations; of these, those with the lowest costs.
+  // The best start at each of some rotations, and of these the ones with the lowest costs.
   std::vector<Candidate> Starts(int object, Shape shape) const {
     const Surface<double> ellipsoid = EllipsoidModel::Unpack(ellipsoids_.row(object).data());
     const Vector3d& up = context_.graph().scene_priors.up;
@@ -184,7 +184,7 @@ class ShapeFitter {
     }
   }
 
-  // Half the sum of the boxes' chi-squares, of which a large one counts by its logarithm.
+  // The sum of log(1 + chi-square) over the boxes: one that is far off decides nothing.
   double CostOf(int object, Shape shape, const Vector9d& parameters) const {
     const Graph& graph = context_.graph();
     const Body<double> body = RoundedModel(shape).Unpack(parameters.data());
@@ -233,8 +233,7 @@ std::vector<Shape> ShapesToTry(Shape wanted) {
 
 void FitShapes(const SolveContext& context, const Stage& all, State* state, Summary* summary) {
   const Graph& graph = context.graph();
-  const auto is_given = [](Shape shape) { return shape != Shape::kEllipsoid; };
-  if (std::none_of(graph.shapes.begin(), graph.shapes.end(), is_given)) return;
+  if (AreEllipsoids(graph.shapes)) return;
   State attempt = *state;
   if (attempt.shapes.empty()) attempt.shapes.assign(graph.num_objects(), Shape::kEllipsoid);
   ShapeFitter fitter(context, all, &attempt);
@@ -243,7 +242,7 @@ void FitShapes(const SolveContext& context, const Stage& all, State* state, Summ
   for (int round = 0; round < kRounds; ++round) {
     bool changed = false;
     for (int object = 0; object < graph.num_objects(); ++object) {
-      if (is_given(graph.shapes[object])) {
+      if (graph.shapes[object] != Shape::kEllipsoid) {
         changed |= fitter.Improve(object, ShapesToTry(graph.shapes[object]));
       }
     }

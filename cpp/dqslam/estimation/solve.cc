@@ -40,6 +40,15 @@ void ValidateOptions(const SolveOptions& options) {
   require(options.grow_min_views > 0, "grow_min_views must be positive");
 }
 
+void ValidateShapes(const SolveOptions& options, const std::vector<Shape>& shapes) {
+  if (AreEllipsoids(shapes) || (options.landmark_model == LandmarkModel::kEllipsoid &&
+                                options.residual == Residual::kTangentThenBox)) {
+    return;
+  }
+  throw std::invalid_argument(
+      "shapes: cuboids and cylinders need the ellipsoid model and the residual TANGENT_THEN_BOX");
+}
+
 void ValidateStart(const Graph& graph, const State& start) {
   CheckState("start", graph, start);
   if (graph.pose_model == PoseModel::kSe3 &&
@@ -244,7 +253,11 @@ Solution Solve(const Graph& graph,
                const Monitor& monitor) {
   const auto begin = std::chrono::steady_clock::now();
   ValidateOptions(options);
-  if (start) ValidateStart(graph, *start);
+  ValidateShapes(options, graph.shapes);
+  if (start) {
+    ValidateStart(graph, *start);
+    ValidateShapes(options, start->shapes);
+  }
   const PreparedGraph prepared(graph, options.mode == Mode::kMapping);
   State state;
   Solution solution;

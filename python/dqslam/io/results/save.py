@@ -132,9 +132,20 @@ def _object(estimate: Estimate, row: int, marginals: Covariances | None) -> dict
     covariance = None if marginals is None else marginals.objects[row]
     if covariance is None or semi_axes is None or not np.isfinite(covariance).all():
         return described
-    jacobian = _core.log_semi_axes_jacobian(estimate.ellipsoids[row])
-    variance = np.diagonal(jacobian @ covariance @ jacobian.T)
     return described | {
         "center_covariance": covariance[:3, :3],
-        "log_semi_axes_sigma": np.sqrt(variance),
+        "log_semi_axes_sigma": np.sqrt(_log_axes_variance(estimate, row, covariance)),
     }
+
+
+def _log_axes_variance(estimate: Estimate, row: int, covariance: Floats) -> Floats:
+    """Return the variances of the logarithms of the semi-axes, descending as these are, (3,)."""
+    if not estimate.is_body[row]:
+        jacobian = _core.log_semi_axes_jacobian(estimate.ellipsoids[row])
+        return np.diagonal(jacobian @ covariance @ jacobian.T)
+    # Each semi-axis of the equivalent ellipsoid is a fixed share of a half-length.
+    share = np.sqrt([5 / 3, 5 / 3, 5 / 3])
+    if estimate.object_shapes[row] == _core.Shape.CYLINDER:
+        share[:2] = np.sqrt(5 / 4)
+    order = np.argsort(-share * estimate.half_lengths[row])
+    return np.diagonal(covariance)[3:6][order]
