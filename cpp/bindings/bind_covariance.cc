@@ -31,6 +31,7 @@ void BindCovariance(py::module_& m) {
           "objects",
           &Covariance::objects,
           "Covariances of the landmark parameters, shape (o, 81); NaN where under-constrained.")
+      .def_readonly("shared", &Covariance::shared, "Variances of the shared numbers, shape (s,).")
       .def_readonly("under_constrained",
                     &Covariance::under_constrained,
                     "The first under-constrained parameter of each pose and object that has one.");

@@ -2,6 +2,7 @@
 #include <pybind11/native_enum.h>
 #include <pybind11/stl.h>
 
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -56,9 +57,50 @@ void BindTables(py::module_& m) {
       .def_readonly("value", &MeasurementTable::value, "What was measured, shape (n, m).")
       .def_readonly("covariance", &MeasurementTable::covariance, "Shape (n, m * m).");
   py::class_<SizePriorTable>(m, "SizePriorTable", "Prior on the size of each object. Immutable.")
-      .def(py::init<Eigen::VectorXd, Eigen::VectorXd>(), py::kw_only(), "log_mean"_a, "log_sigma"_a)
+      .def(py::init<Eigen::VectorXd, Eigen::VectorXd, IndexVector>(),
+           py::kw_only(),
+           "log_mean"_a,
+           "log_sigma"_a,
+           "shared"_a = IndexVector())
       .def_readonly("log_mean", &SizePriorTable::log_mean, "Of semi-axes, log meters, shape (o,).")
-      .def_readonly("log_sigma", &SizePriorTable::log_sigma, "Shape (o,).");
+      .def_readonly("log_sigma", &SizePriorTable::log_sigma, "Shape (o,).")
+      .def_readonly("shared",
+                    &SizePriorTable::shared,
+                    "The shared number that is added to each log_mean, or -1; shape (o,) or (0,).");
+}
+
+void BindPlacements(py::module_& m) {
+  py::native_enum<Placement>(m, "Placement", "enum.Enum", "How an object is placed.")
+      .value("ON", Placement::kOn)
+      .value("BESIDE", Placement::kBeside)
+      .value("ALIGNED", Placement::kAligned)
+      .value("UPRIGHT", Placement::kUpright)
+      .finalize();
+  py::class_<PlacementTable>(
+      m, "PlacementTable", "How objects are placed; each row may be wrong. Immutable.")
+      .def(py::init<std::vector<Placement>,
+                    IndexVector,
+                    IndexVector,
+                    IndexVector,
+                    Eigen::VectorXd,
+                    Eigen::VectorXd>(),
+           py::kw_only(),
+           "kind"_a,
+           "object"_a,
+           "other"_a,
+           "shared"_a,
+           "distance"_a,
+           "sigma"_a)
+      .def_readonly("kind", &PlacementTable::kind)
+      .def_readonly("object", &PlacementTable::object, "Shape (p,).")
+      .def_readonly("other", &PlacementTable::other, "Another object, or -1, shape (p,).")
+      .def_readonly("shared",
+                    &PlacementTable::shared,
+                    "The shared number that is added to the height of a plane, or -1, shape (p,).")
+      .def_readonly("distance",
+                    &PlacementTable::distance,
+                    "Meters: height of the plane, or largest horizontal distance, shape (p,).")
+      .def_readonly("sigma", &PlacementTable::sigma, "Meters or radians, shape (p,).");
 }
 
 void BindShape(py::module_& m) {
@@ -93,6 +135,7 @@ void BindGraph(py::module_& m) {
   BindTables(m);
   BindShape(m);
   BindScenePriors(m);
+  BindPlacements(m);
   py::class_<Graph>(m, "Graph", "The problem as plain tables; ids are row numbers. Immutable.")
       .def(py::init([](PoseModel pose_model,
                        const Camera& camera,
@@ -102,7 +145,9 @@ void BindGraph(py::module_& m) {
                        SizePriorTable size_prior,
                        std::vector<MeasurementTable> measurements,
                        const ScenePriors& scene_priors,
-                       std::vector<Shape> shapes) {
+                       std::vector<Shape> shapes,
+                       Eigen::VectorXd shared_sigma,
+                       std::optional<PlacementTable> placements) {
              Graph graph{pose_model,
                          camera,
                          initial_poses,
@@ -111,7 +156,9 @@ void BindGraph(py::module_& m) {
                          measurements,
                          size_prior,
                          scene_priors,
-                         std::move(shapes)};
+                         std::move(shapes),
+                         std::move(shared_sigma),
+                         placements.value_or(PlacementTable())};
              Validate(graph, /*poses_known=*/true);  // solve() asks for odometry where it needs it
              return graph;
            }),
@@ -125,6 +172,8 @@ void BindGraph(py::module_& m) {
            "measurements"_a = std::vector<MeasurementTable>(),
            "scene_priors"_a = ScenePriors(),
            "shapes"_a = std::vector<Shape>(),
+           "shared_sigma"_a = Eigen::VectorXd(),
+           "placements"_a = std::nullopt,
            "initial_poses (n, d): dead reckoning, or the known poses when mapping.")
       .def_readonly("pose_model", &Graph::pose_model)
       .def_readonly("camera", &Graph::camera)
@@ -135,6 +184,10 @@ void BindGraph(py::module_& m) {
       .def_readonly("measurements", &Graph::measurements, "One table a kind.")
       .def_readonly("scene_priors", &Graph::scene_priors)
       .def_readonly("shapes", &Graph::shapes, "One an object; empty if all are ellipsoids.")
+      .def_readonly("shared_sigma",
+                    &Graph::shared_sigma,
+                    "Sigmas of the numbers that priors have in common, shape (s,).")
+      .def_readonly("placements", &Graph::placements)
       .def_property_readonly("num_poses", &Graph::num_poses)
       .def_property_readonly("num_objects", &Graph::num_objects);
 }

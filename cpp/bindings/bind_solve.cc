@@ -138,16 +138,23 @@ void BindOptions(py::module_& m) {
 
 void BindSolution(py::module_& m) {
   py::class_<State>(m, "State", "Poses and landmark parameters at which a solve can start.")
-      .def(py::init([](RowMatrix poses, RowMatrix landmarks, std::vector<Shape> shapes) {
-             return State{std::move(poses), std::move(landmarks), {}, std::move(shapes)};
+      .def(py::init([](RowMatrix poses,
+                       RowMatrix landmarks,
+                       std::vector<Shape> shapes,
+                       Eigen::VectorXd shared) {
+             return State{
+                 std::move(poses), std::move(landmarks), {}, std::move(shapes), std::move(shared)};
            }),
            "poses"_a,
            "landmarks"_a,
            "shapes"_a = std::vector<Shape>(),
-           "Poses (n, d), landmark parameters (o, 9), and their shapes unless all are ellipsoids.")
+           "shared"_a = Eigen::VectorXd(),
+           "Poses (n, d), landmark parameters (o, 9), their shapes unless all are ellipsoids, and "
+           "the shared numbers unless all are 0.")
       .def_readonly("poses", &State::poses, "Poses, shape (n, d).")
       .def_readonly("landmarks", &State::landmarks, "Landmark parameters, shape (o, 9).")
-      .def_readonly("shapes", &State::shapes, "One an object; empty if all are ellipsoids.");
+      .def_readonly("shapes", &State::shapes, "One an object; empty if all are ellipsoids.")
+      .def_readonly("shared", &State::shared, "Shared numbers, shape (s,); empty if all are 0.");
   py::class_<Summary>(m, "Summary", "How a solve went.")
       .def_readonly("initial_cost",
                     &Summary::initial_cost,
@@ -199,6 +206,7 @@ void BindSolution(py::module_& m) {
           &Solution::svd_singular_values,
           "Singular values of each object's SVD start, shape (o, 10), descending; NaN where the "
           "SVD was not used.")
+      .def_readonly("shared", &Solution::shared, "The shared numbers of the graph, shape (s,).")
       .def_readonly("inliers", &Solution::inliers, "Whether each box fits its object, shape (b,).")
       .def_readonly("summary", &Solution::summary, "How the solve went.");
 }

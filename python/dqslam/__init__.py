@@ -44,6 +44,7 @@ if TYPE_CHECKING:  # the one list of public names, a line each: lazy_exports rea
     from dqslam.absolute import solve_with_absolute_positions as solve_with_absolute_positions
     from dqslam.association import Association as Association
     from dqslam.association import associate as associate
+    from dqslam.assumptions import UNKNOWN_SIZE as UNKNOWN_SIZE
     from dqslam.assumptions import BoxNoise as BoxNoise
     from dqslam.assumptions import OdometryNoise as OdometryNoise
     from dqslam.assumptions import SizePrior as SizePrior

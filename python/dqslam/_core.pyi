@@ -27,6 +27,8 @@ __all__: list[str] = [
     "Mode",
     "OdometryTable",
     "OnlineOptions",
+    "Placement",
+    "PlacementTable",
     "PoseModel",
     "Relocation",
     "Residual",
@@ -295,6 +297,7 @@ class SizePriorTable:
         *,
         log_mean: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
         log_sigma: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        shared: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"] = ...,
     ) -> None: ...
     @property
     def log_mean(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
@@ -305,6 +308,11 @@ class SizePriorTable:
     def log_sigma(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
         """
         Shape (o,).
+        """
+    @property
+    def shared(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]:
+        """
+        The shared number that is added to each log_mean, or -1; shape (o,) or (0,).
         """
 
 class Shape(enum.Enum):
@@ -371,6 +379,58 @@ class ScenePriors:
     @upright_sigma.setter
     def upright_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
 
+class Placement(enum.Enum):
+    """
+    How an object is placed.
+    """
+
+    ALIGNED = 2
+    BESIDE = 1
+    ON = 0
+    UPRIGHT = 3
+
+class PlacementTable:
+    """
+    How objects are placed; each row may be wrong. Immutable.
+    """
+    def __init__(
+        self,
+        *,
+        kind: collections.abc.Sequence[Placement],
+        object: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
+        other: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
+        shared: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
+        distance: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        sigma: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    ) -> None: ...
+    @property
+    def distance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        Meters: height of the plane, or largest horizontal distance, shape (p,).
+        """
+    @property
+    def kind(self) -> list[Placement]: ...
+    @property
+    def object(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]:
+        """
+        Shape (p,).
+        """
+    @property
+    def other(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]:
+        """
+        Another object, or -1, shape (p,).
+        """
+    @property
+    def shared(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]:
+        """
+        The shared number that is added to the height of a plane, or -1, shape (p,).
+        """
+    @property
+    def sigma(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        Meters or radians, shape (p,).
+        """
+
 class Graph:
     """
     The problem as plain tables; ids are row numbers. Immutable.
@@ -387,6 +447,8 @@ class Graph:
         measurements: collections.abc.Sequence[MeasurementTable] = [],
         scene_priors: ScenePriors = ...,
         shapes: collections.abc.Sequence[Shape] = [],
+        shared_sigma: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] = ...,
+        placements: PlacementTable | None = None,
     ) -> None:
         """
         initial_poses (n, d): dead reckoning, or the known poses when mapping.
@@ -412,6 +474,8 @@ class Graph:
     @property
     def odometry(self) -> OdometryTable: ...
     @property
+    def placements(self) -> PlacementTable: ...
+    @property
     def pose_model(self) -> PoseModel: ...
     @property
     def scene_priors(self) -> ScenePriors: ...
@@ -419,6 +483,11 @@ class Graph:
     def shapes(self) -> list[Shape]:
         """
         One an object; empty if all are ellipsoids.
+        """
+    @property
+    def shared_sigma(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        Sigmas of the numbers that priors have in common, shape (s,).
         """
     @property
     def size_prior(self) -> SizePriorTable: ...
@@ -642,9 +711,10 @@ class State:
         poses: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
         landmarks: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
         shapes: collections.abc.Sequence[Shape] = [],
+        shared: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] = ...,
     ) -> None:
         """
-        Poses (n, d), landmark parameters (o, 9), and their shapes unless all are ellipsoids.
+        Poses (n, d), landmark parameters (o, 9), their shapes unless all are ellipsoids, and the shared numbers unless all are 0.
         """
     @property
     def landmarks(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
@@ -660,6 +730,11 @@ class State:
     def shapes(self) -> list[Shape]:
         """
         One an object; empty if all are ellipsoids.
+        """
+    @property
+    def shared(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        Shared numbers, shape (s,); empty if all are 0.
         """
 
 class Summary:
@@ -759,6 +834,11 @@ class Solution:
         Shapes of the objects; empty if all are ellipsoids.
         """
     @property
+    def shared(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        The shared numbers of the graph, shape (s,).
+        """
+    @property
     def summary(self) -> Summary:
         """
         How the solve went.
@@ -812,6 +892,11 @@ class Covariance:
     def poses(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
         """
         Covariances in the frames of the poses, shape (n, k * k); NaN where under-constrained.
+        """
+    @property
+    def shared(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        Variances of the shared numbers, shape (s,).
         """
     @property
     def under_constrained(self) -> list[UnderConstrained]:

@@ -50,6 +50,9 @@ class Estimate:
     object_shapes: tuple[Shape, ...] = ()
     """The shape of each mapped object; empty if all are in the landmark model. In `dual_quadrics`
     and `ellipsoids`, an ellipsoid with the same second moments stands for a cuboid or cylinder."""
+    shared: Floats = field(default_factory=lambda: np.zeros(0))
+    """The numbers that priors of several objects have in common, in the order of the problem:
+    by how much the logarithm of a median size differs from `SizePrior.log_mean`, shape (s,)."""
     inliers: Bools = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
     """Whether the chi-square of each box is at most `outlier_chi_square`, shape (b,)."""
     dropped: Mapping[int, str] = field(default_factory=dict)

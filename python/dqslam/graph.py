@@ -19,7 +19,9 @@ from dqslam.layout import (
     objects_of,
     odometry_table,
     shapes_of,
+    size_prior_table,
     size_priors_of,
+    unknown_medians,
 )
 from dqslam.lens import Lens, LensCamera, camera_with
 from dqslam.recording import Recording
@@ -110,6 +112,7 @@ def build_graph(
     object_ids, box_object, observations = objects_of(detections)
     class_names = class_names_of(detections, box_object, len(object_ids))
     priors = size_priors_of(size_prior, class_names, detections)
+    medians = unknown_medians(priors)
     core = _core.Graph(
         odometry.pose_model,
         recording.camera,
@@ -124,10 +127,8 @@ def build_graph(
             covariance=flat(box_noise.covariance(detections.box, recording.camera)),
             truncated=detections.truncated,
         ),
-        size_prior=_core.SizePriorTable(
-            log_mean=np.array([prior.log_mean for prior in priors]),
-            log_sigma=np.array([prior.log_sigma for prior in priors]),
-        ),
+        size_prior=size_prior_table(priors, medians),
+        shared_sigma=np.array([prior.median_log_sigma for prior in medians]),
         measurements=[measurement_table(each, object_ids) for each in measurements_of(recording)],
         scene_priors=_core.ScenePriors() if scene_priors is None else scene_priors,
         shapes=shapes_of(shapes, class_names, detections),
@@ -211,6 +212,7 @@ def solve(
         object_shapes=tuple(
             shape for shape, keep in zip(solution.shapes, kept, strict=False) if keep
         ),
+        shared=solution.shared,
         inliers=solution.inliers,
         dropped=unfit,
         contradicted=contradicted_objects(

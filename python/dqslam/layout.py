@@ -8,7 +8,7 @@ import numpy as np
 
 from dqslam import _core
 from dqslam._checks import Floats, Ints, reject_rows
-from dqslam.assumptions import SizePrior, SizePriors
+from dqslam.assumptions import UNKNOWN_SIZE, SizePrior, SizePriors
 from dqslam.recording import Detections, LoopClosures, Measurements, Odometry, Recording
 
 
@@ -19,7 +19,23 @@ def size_priors_of(
     if isinstance(given, SizePriors):
         given.check_classes(set(detections.class_names.values()))
         return [given.of(name) for name in class_names]
-    return [SizePrior() if given is None else given] * len(class_names)
+    return [UNKNOWN_SIZE if given is None else given] * len(class_names)
+
+
+def unknown_medians(priors: list[SizePrior]) -> list[SizePrior]:
+    """Return the different priors whose median is unknown; each has a shared number."""
+    return list(dict.fromkeys(prior for prior in priors if prior.median_log_sigma != 0.0))
+
+
+def size_prior_table(priors: list[SizePrior], medians: list[SizePrior]) -> _core.SizePriorTable:
+    """Return the prior of each object, with the rows of the unknown medians."""
+    return _core.SizePriorTable(
+        log_mean=np.array([prior.log_mean for prior in priors]),
+        log_sigma=np.array([prior.log_sigma for prior in priors]),
+        shared=np.array(
+            [medians.index(prior) if prior in medians else -1 for prior in priors], dtype=np.int64
+        ),
+    )
 
 
 def shapes_of(

@@ -18,6 +18,8 @@ def rebuilt(core: _core.Graph, **changes: Any) -> _core.Graph:
         "measurements",
         "scene_priors",
         "shapes",
+        "shared_sigma",
+        "placements",
     )
     tables = {name: getattr(core, name) for name in names} | changes
     return _core.Graph(core.pose_model, core.camera, **tables)
@@ -38,12 +40,29 @@ def only_objects(core: _core.Graph, kept: Bools) -> _core.Graph:
             truncated=boxes.truncated[box],
         ),
         size_prior=_core.SizePriorTable(
-            log_mean=prior.log_mean[kept], log_sigma=prior.log_sigma[kept]
+            log_mean=prior.log_mean[kept],
+            log_sigma=prior.log_sigma[kept],
+            shared=prior.shared[kept] if len(prior.shared) else prior.shared,
         ),
+        placements=_placements_of(core.placements, kept, row),
         measurements=[_only_kept(table, kept, row) for table in core.measurements],
         shapes=[shape for shape, keep in zip(core.shapes, kept, strict=True) if keep]
         if core.shapes
         else [],
+    )
+
+
+def _placements_of(
+    table: _core.PlacementTable, kept: Bools, row: Ints
+) -> _core.PlacementTable:
+    part = kept[table.object] & ((table.other < 0) | kept[table.other])
+    return _core.PlacementTable(
+        kind=[kind for kind, keep in zip(table.kind, part, strict=True) if keep],
+        object=row[table.object[part]],
+        other=np.where(table.other[part] < 0, -1, row[table.other[part]]),
+        shared=table.shared[part],
+        distance=table.distance[part],
+        sigma=table.sigma[part],
     )
 
 

@@ -109,7 +109,8 @@ def marginal_covariances(
         landmarks = estimate.landmarks
     mapped = np.isin(graph.object_ids, estimate.object_ids)
     core = graph.core if mapped.all() else only_objects(graph.core, mapped)
-    state = _core.State(estimate.poses, landmarks, list(estimate.object_shapes))
+    shapes = list(estimate.object_shapes)
+    state = _core.State(estimate.poses, landmarks, shapes, estimate.shared)
     found = _marginals(core, estimate.object_ids, options, state)
     return replace(found, objects=with_contradictions(found.objects, estimate))
 

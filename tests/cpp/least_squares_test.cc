@@ -14,6 +14,22 @@
 namespace dqslam {
 namespace {
 
+/// Every kind of placement, on a plane of unknown height, and an unknown median of the sizes.
+void AddPlacements(Graph* graph) {
+  graph->shared_sigma = Eigen::Vector2d(1.0, 0.5);
+  graph->size_prior.shared = IndexVector::Zero(graph->num_objects());
+  graph->placements = {{Placement::kOn,
+                        Placement::kOn,
+                        Placement::kBeside,
+                        Placement::kAligned,
+                        Placement::kUpright},
+                       (IndexVector(5) << 0, 2, 1, 2, 1).finished(),
+                       (IndexVector(5) << -1, 1, 0, 0, -1).finished(),
+                       (IndexVector(5) << 1, -1, -1, -1, -1).finished(),
+                       Eigen::VectorXd::Constant(5, 0.1),
+                       Eigen::VectorXd::Constant(5, 0.4)};
+}
+
 /// A scene off its truth, with every kind of term.
 template <typename Pose>
 struct Displaced {
@@ -32,6 +48,8 @@ struct Displaced {
     scene.graph.scene_priors.camera_height = 0.5;
     scene.graph.scene_priors.camera_height_sigma = 0.1;
     AddMeasurements(&scene.graph);
+    AddPlacements(&scene.graph);
+    state.shared = Eigen::Vector2d(0.2, -0.1);
     for (int row = 0; row < scene.graph.boxes.size(); row += 3) {
       scene.graph.boxes.truncated(row, 2) = true;
     }
@@ -40,7 +58,7 @@ struct Displaced {
   State state;
 };
 
-/// Normal equations of the same stage by Ceres: poses, then objects, as ours.
+/// Normal equations of the same stage by Ceres: poses, objects, then shared numbers, as ours.
 struct Reference {
   Reference(const PreparedGraph& prepared,
             const SolveOptions& options,
@@ -55,6 +73,7 @@ struct Reference {
     for (int object = 0; object < prepared.graph.num_objects(); ++object) {
       evaluate.parameter_blocks.push_back(state.landmarks.row(object).data());
     }
+    for (double& shared : state.shared) evaluate.parameter_blocks.push_back(&shared);
     std::vector<double> residuals, slope;
     ceres::CRSMatrix crs;
     EXPECT_TRUE(problem.Evaluate(evaluate, &cost, &residuals, &slope, &crs));

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from dqslam import SizePrior, SizePriors, load_size_priors
+from dqslam import UNKNOWN_SIZE, SizePrior, SizePriors, load_size_priors
 from dqslam.io import FileError
 
 TABLE = """
@@ -36,7 +36,7 @@ def test_a_table_by_hand(tmp_path):
 def test_without_a_default_other_classes_have_the_usual_one(tmp_path):
     priors = load_size_priors(written(tmp_path, "# nothing is known\n"))
     assert priors == SizePriors({})
-    assert priors.of("sofa") == SizePrior()
+    assert priors.of("sofa") == UNKNOWN_SIZE
 
 
 def test_classes_that_are_not_there_are_named():

@@ -57,6 +57,7 @@ class ResidualRows {
  private:
   const double* ValuesOf(PoseRow pose) const { return state_.poses.row(pose.row).data(); }
   const double* ValuesOf(ObjectRow object) const { return state_.landmarks.row(object.row).data(); }
+  const double* ValuesOf(SharedRow shared) const { return state_.SharedAt(shared.row); }
 
   const SolveContext& context_;
   const State& state_;

@@ -63,7 +63,9 @@ Covariance ComputeCovariance(const Graph& graph, const SolveOptions& options, co
   covariance.poses = RowMatrix::Zero(graph.num_poses(), k * k);
   covariance.objects = RowMatrix::Zero(graph.num_objects(), kLandmarkSize * kLandmarkSize);
   int offset = 0;
-  for (int b = 0; b < static_cast<int>(information.block_sizes.size()); ++b) {
+  covariance.shared.resize(graph.num_shared());
+  const int blocks = information.num_free_poses + graph.num_objects();
+  for (int b = 0; b < blocks; ++b) {
     const int size = information.block_sizes[b];
     const bool is_pose = b < information.num_free_poses;
     const int of_table = is_pose ? information.first_free_pose + b : b - information.num_free_poses;
@@ -78,6 +80,9 @@ Covariance ComputeCovariance(const Graph& graph, const SolveOptions& options, co
       break;
     }
     offset += size;
+  }
+  for (int row = 0; row < graph.num_shared(); ++row, ++offset) {
+    covariance.shared[row] = inverse(offset, offset);
   }
   return covariance;
 }

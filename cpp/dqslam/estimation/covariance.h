@@ -24,6 +24,7 @@ struct UnderConstrained {
 struct Covariance {
   RowMatrix poses;    ///< (poses, k * k) in the frames of the poses; NaN where under-constrained
   RowMatrix objects;  ///< (objects, 81) of the landmark parameters; NaN where under-constrained
+  Eigen::VectorXd shared;  ///< variance of each shared number
   /// The first under-constrained parameter of each pose and object that has one.
   std::vector<UnderConstrained> under_constrained;
 };

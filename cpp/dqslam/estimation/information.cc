@@ -73,6 +73,7 @@ class JacobianRows {
  private:
   const double* ValuesOf(PoseRow pose) const { return state_.poses.row(pose.row).data(); }
   const double* ValuesOf(ObjectRow object) const { return state_.landmarks.row(object.row).data(); }
+  const double* ValuesOf(SharedRow shared) const { return state_.SharedAt(shared.row); }
   template <typename Row>
   auto ParametersOf(Row row) const {
     return dqslam::ParametersOf<Pose>(row, ValuesOf(row));

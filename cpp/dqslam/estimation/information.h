@@ -8,13 +8,14 @@
 
 namespace dqslam {
 
-/// Columns: the tangents of the free poses in their order, then the parameters of all objects.
+/// Columns: the tangents of the free poses in their order, then the parameters of all objects, then
+/// the shared numbers.
 struct Information {
   /// Rows: the residuals of odometry, then of boxes, then of all other terms, in sigmas.
   Eigen::SparseMatrix<double> jacobian;
   Eigen::SparseMatrix<double> matrix;  ///< H
   Eigen::VectorXd residuals;           ///< in sigmas, one for each row of the Jacobian
-  std::vector<int> block_sizes;        ///< columns of each free pose, then of each object
+  std::vector<int> block_sizes;        ///< columns of each block
   int first_free_pose = 1;
   int num_free_poses = 0;
   int num_boxes = 0;  ///< the number of boxes among the residuals

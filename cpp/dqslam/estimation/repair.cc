@@ -38,10 +38,10 @@ bool KeepIfBetter(const State& attempt, const Summary& total, State* state, Summ
 // very thin ellipsoid fits the boxes.
 bool HasImpossibleSize(const SolveContext& context, const State& state, int object) {
   if (context.options.landmark_model != LandmarkModel::kEllipsoid) return false;
-  const SizePriorTable& prior = context.graph().size_prior;
+  const SizePrior prior = SizePriorOf(context.graph(), state, object);
   const Eigen::Array3d semi_axes = AxesFromEllipsoid(state.landmarks.row(object)).semi_axes;
-  const Eigen::Array3d error = semi_axes.log() - prior.log_mean[object];
-  return error.square().sum() > kImpossibleSize * std::pow(prior.log_sigma[object], 2);
+  const Eigen::Array3d error = semi_axes.log() - prior.log_mean;
+  return error.square().sum() > kImpossibleSize * std::pow(prior.log_sigma, 2);
 }
 
 double WeightOf(const Stage& stage, size_t i) {
@@ -106,6 +106,7 @@ Stage StageOfObject(const Stage& all, const std::vector<int>& boxes, const Graph
   stage.boxes = boxes;
   stage.weights.clear();
   stage.end_pose = stage.first_free_pose = graph.boxes.pose[boxes.back()] + 1;
+  stage.moves_shared = false;
   return stage;
 }
 

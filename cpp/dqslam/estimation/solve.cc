@@ -110,6 +110,7 @@ class Solver {
       state->shapes = start->shapes;
       state->poses = start->poses;
       state->landmarks = start->landmarks;
+      state->shared = start->shared;
     } else {
       const auto begin = std::chrono::steady_clock::now();
       summary = ReachStart(state);
@@ -274,6 +275,7 @@ Solution Solve(const Graph& graph,
   solution.inliers = solver.Inliers(state);
   solution.landmarks = state.landmarks;
   solution.shapes = state.shapes;
+  solution.shared = state.shared;
   solution.dual_quadrics = state.landmarks;
   if (options.landmark_model == LandmarkModel::kEllipsoid) {
     for (Eigen::Index row = 0; row < state.landmarks.rows(); ++row) {

@@ -16,6 +16,7 @@ struct Solution {
   RowMatrix dual_quadrics;        ///< (objects, 9) q1 .. q9, for both landmark models; that of
                                   ///< the equivalent ellipsoid for cuboids and cylinders
   RowMatrix svd_singular_values;  ///< (objects, 10) of the SVD starts; NaN where not used
+  Eigen::VectorXd shared;         ///< the shared numbers of the graph
   Mask inliers;                   ///< (boxes) chi-square is at most options.outlier_chi_square
   Summary summary;
 };

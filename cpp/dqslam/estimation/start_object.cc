@@ -31,7 +31,7 @@ Vector9d StartObject(const SolveContext& context,
                      const std::vector<int>& boxes) {
   const Graph& graph = context.graph();
   const std::vector<View> views = ViewsOf(context.prepared, state, boxes);
-  const SizePrior prior{graph.size_prior.log_mean[object], graph.size_prior.log_sigma[object]};
+  const SizePrior prior = SizePriorOf(graph, state, object);
   const bool unconstrained = context.options.landmark_model == LandmarkModel::kDualQuadric;
   switch (context.options.start) {
     case Start::kIdentity:

@@ -31,10 +31,11 @@ struct PoseParameters {
   }
 };
 
-/// The parameters of an object, which are their own tangent.
-struct ObjectParameters {
-  static constexpr int kSize = kLandmarkSize;
-  static constexpr int kTangentSize = kLandmarkSize;
+/// Parameters that are their own tangent.
+template <int kLength>
+struct PlainParameters {
+  static constexpr int kSize = kLength;
+  static constexpr int kTangentSize = kLength;
   const double* values;
 
   template <typename Jet>
@@ -44,6 +45,10 @@ struct ObjectParameters {
     return jets;
   }
 };
+
+/// The parameters of an object, and a number that objects share.
+using ObjectParameters = PlainParameters<kLandmarkSize>;
+using SharedParameters = PlainParameters<1>;
 
 /// Residual of a cost, and its Jacobian by the tangents of its blocks, side by side in their order.
 /// Returns false if the cost fails.

@@ -155,6 +155,11 @@ void CheckState(const std::string& name, const Graph& graph, const State& state)
                                 std::to_string(graph.num_objects()) + ", 9)");
   }
   CheckShapes(name + ": shapes", state.shapes, graph.num_objects());
+  if (state.shared.size() != 0 &&
+      (state.shared.size() != graph.num_shared() || !state.shared.allFinite())) {
+    throw std::invalid_argument(name + ": need " + std::to_string(graph.num_shared()) +
+                                " finite shared numbers, or none");
+  }
   if (std::count(state.shapes.begin(), state.shapes.end(), Shape::kAuto) > 0) {
     throw std::invalid_argument(name + ": shapes: a state has no AUTO");
   }
@@ -188,6 +193,43 @@ void CheckOdometry(const Graph& graph, bool poses_known) {
 
 }  // namespace
 
+namespace {
+
+void CheckShared(const std::string& name, const IndexVector& shared, const Graph& graph) {
+  for (Eigen::Index row = 0; row < shared.size(); ++row) {
+    if (shared[row] < -1 || shared[row] >= graph.num_shared()) {
+      FailAt(name, row, "is neither -1 nor a row of shared_sigma");
+    }
+  }
+}
+
+void CheckPlacements(const Graph& graph) {
+  const PlacementTable& table = graph.placements;
+  const Eigen::Index rows = table.size();
+  if (static_cast<Eigen::Index>(table.kind.size()) != rows || table.other.size() != rows ||
+      table.shared.size() != rows) {
+    throw std::invalid_argument("placements: kind, object, other and shared differ in length");
+  }
+  CheckIds("placement_object", table.object, rows, graph.num_objects());
+  CheckTable("placement_distance", table.distance, rows, 1);
+  CheckTable("placement_sigma", table.sigma, rows, 1);
+  CheckShared("placement_shared", table.shared, graph);
+  for (Eigen::Index row = 0; row < rows; ++row) {
+    const int other = table.other[row];
+    const bool on_plane = table.kind[row] == Placement::kOn && table.shared[row] >= 0;
+    const bool needs_other = !on_plane && table.kind[row] != Placement::kUpright;
+    if (other < -1 || other >= graph.num_objects() || other == table.object[row]) {
+      FailAt("placement_other", row, "is neither -1 nor another object");
+    }
+    if (needs_other != (other >= 0)) {
+      FailAt("placement_other", row, needs_other ? "must be an object" : "must be -1");
+    }
+    if (table.sigma[row] <= 0) FailAt("placement_sigma", row, "must be positive");
+  }
+}
+
+}  // namespace
+
 void Validate(const Graph& graph, bool poses_known) {
   graph.camera.Validate();
   if (graph.num_poses() < 1) throw std::invalid_argument("initial_poses: need at least one pose");
@@ -208,6 +250,17 @@ void Validate(const Graph& graph, bool poses_known) {
   }
   CheckScenePriors(graph.scene_priors);
   CheckShapes("shapes", graph.shapes, graph.num_objects());
+  CheckTable("shared_sigma", graph.shared_sigma, graph.num_shared(), 1);
+  for (int row = 0; row < graph.num_shared(); ++row) {
+    if (graph.shared_sigma[row] <= 0) FailAt("shared_sigma", row, "must be positive");
+  }
+  if (graph.size_prior.shared.size() != 0) {
+    if (graph.size_prior.shared.size() != graph.num_objects()) {
+      throw std::invalid_argument("size_prior: shared needs a row for each object");
+    }
+    CheckShared("size_prior: shared", graph.size_prior.shared, graph);
+  }
+  CheckPlacements(graph);
 }
 
 }  // namespace dqslam

@@ -46,7 +46,14 @@ struct SizePrior {
 /// The same for every object of a graph.
 struct SizePriorTable {
   Eigen::VectorXd log_mean, log_sigma;  ///< one row for each object
+  /// The row of the shared number that is added to log_mean, or -1; if empty, -1 for all.
+  IndexVector shared = {};
 };
+
+/// The row of the shared number of an object's prior, or -1.
+inline int SharedOf(const IndexVector& shared, int object) {
+  return shared.size() == 0 ? -1 : shared[object];
+}
 
 /// Prior knowledge of the scene.  Each part is off while its sigma is 0.
 struct ScenePriors {
@@ -56,6 +63,21 @@ struct ScenePriors {
   double support_sigma = 0;        ///< meters: each object stands on the ground
   double camera_height = 0;        ///< meters above the ground
   double camera_height_sigma = 0;  ///< meters
+};
+
+/// How an object is placed; the residuals are in costs/placements.h.
+enum class Placement { kOn, kBeside, kAligned, kUpright };
+
+/// Placements, each of which may be wrong.  They are priors along the vector `up` of the scene.
+struct PlacementTable {
+  std::vector<Placement> kind;
+  IndexVector object;
+  IndexVector other;   ///< the object that it refers to, or -1 for a plane or none
+  IndexVector shared;  ///< of kOn a plane: the shared number that is added to its height; else -1
+  /// Meters: the height of the plane, or the largest horizontal distance of kBeside.
+  Eigen::VectorXd distance;
+  Eigen::VectorXd sigma;  ///< meters or radians
+  int size() const { return static_cast<int>(object.size()); }
 };
 
 struct Graph {
@@ -68,9 +90,14 @@ struct Graph {
   SizePriorTable size_prior;
   ScenePriors scene_priors;
   std::vector<Shape> shapes = {};  ///< one for each object; if empty, all are ellipsoids
+  /// The sigma of each shared number: an unknown that priors of several objects have in common, as
+  /// the logarithm of their common size, or the height of a plane.  Its mean is 0.
+  Eigen::VectorXd shared_sigma = {};
+  PlacementTable placements = {};
 
   int num_poses() const { return static_cast<int>(initial_poses.rows()); }
   int num_objects() const { return static_cast<int>(size_prior.log_mean.size()); }
+  int num_shared() const { return static_cast<int>(shared_sigma.size()); }
   int pose_size() const { return pose_model == PoseModel::kSe2 ? Se2::kSize : Se3::kSize; }
   int tangent_size() const {
     return pose_model == PoseModel::kSe2 ? Se2::kTangentSize : Se3::kTangentSize;
@@ -91,7 +118,21 @@ struct State {
   /// How the rows of `landmarks` are read; if empty, all are in the landmark model.  Cuboids and
   /// cylinders have the parameters of geometry/body.h.
   std::vector<Shape> shapes = {};
+  Eigen::VectorXd shared = {};  ///< the shared numbers; if empty, all are 0
+
+  /// A shared number; that of row -1 is 0.
+  const double* SharedAt(int row) const {
+    static constexpr double kZero = 0;
+    return row < 0 || shared.size() == 0 ? &kZero : &shared[row];
+  }
 };
+
+/// The size prior of an object, at the shared numbers of a state.
+inline SizePrior SizePriorOf(const Graph& graph, const State& state, int object) {
+  const SizePriorTable& table = graph.size_prior;
+  return {table.log_mean[object] + *state.SharedAt(SharedOf(table.shared, object)),
+          table.log_sigma[object]};
+}
 
 struct Summary {
   /// Half the sum of squared residuals, in sigmas and after the loss, at the start of the first

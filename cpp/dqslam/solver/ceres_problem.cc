@@ -29,6 +29,13 @@ class ResidualBlocks {
       problem_.AddParameterBlock(parameters, Pose::kSize, manifold);
       if (pose < variables.first_free_pose) problem_.SetParameterBlockConstant(parameters);
     }
+    if (state_.shared.size() == 0) state_.shared.setZero(variables.num_shared);
+    for (int row = 0; row < variables.num_shared; ++row) {
+      problem_.AddParameterBlock(ParametersOf(SharedRow{row}), 1);
+      if (!variables.moves_shared) {
+        problem_.SetParameterBlockConstant(ParametersOf(SharedRow{row}));
+      }
+    }
     EllipsoidManifold* of_ellipsoids = nullptr;
     for (const int object : variables.objects) {
       double* parameters = ParametersOf(ObjectRow{object});
@@ -73,6 +80,7 @@ class ResidualBlocks {
  private:
   double* ParametersOf(PoseRow pose) { return state_.poses.row(pose.row).data(); }
   double* ParametersOf(ObjectRow object) { return state_.landmarks.row(object.row).data(); }
+  double* ParametersOf(SharedRow shared) { return &state_.shared[shared.row]; }
 
   const SolveContext& context_;
   Loss loss_;

@@ -34,6 +34,7 @@ class Step {
     }
     return EllipsoidManifold().Plus(Before(object), TangentOf(object), After(object));
   }
+  void Move(SharedRow shared) { *After(shared) = *Before(shared) + *TangentOf(shared); }
   void MoveBehind(PoseRow previous, PoseRow pose) {
     PlusBehind<Pose>(Moved(previous), Before(pose), TangentOf(pose), After(pose));
   }
@@ -89,6 +90,7 @@ bool Retract(const StageTerms& terms,
   for (int pose = variables.first_free_pose; pose < variables.end_pose; ++pose) {
     steps.Move(PoseRow{pose});
   }
+  for (int row = 0; row < variables.num_shared; ++row) steps.Move(SharedRow{row});
   return std::all_of(variables.objects.begin(), variables.objects.end(), [&](int object) {
     return steps.Move(ObjectRow{object});
   });
@@ -110,6 +112,7 @@ bool RetractAlongPath(const PreparedGraph& prepared,
       steps.MoveBehind(PoseRow{prepared.graph.odometry.from[row]}, PoseRow{pose});
     }
   }
+  for (int row = 0; row < variables.num_shared; ++row) steps.Move(SharedRow{row});
   const std::vector<int> viewers = Viewers(prepared.graph, terms);
   return std::all_of(variables.objects.begin(), variables.objects.end(), [&](int object) {
     return steps.MoveBeside(PoseRow{viewers[object]}, ObjectRow{object});

@@ -26,6 +26,7 @@ struct SolveContext {
 struct Stage {
   int first_free_pose = 1;                 ///< poses before it are constant
   int end_pose = 0;                        ///< poses from this one on are not in the stage
+  bool moves_shared = true;                ///< whether the shared numbers are free
   std::vector<int> boxes;                  ///< rows of the boxes in the stage, with their objects
   std::vector<double> weights;             ///< of these boxes, in [0, 1]; if empty, all are 1
   Residual residual = Residual::kTangent;  ///< any but kTangentThenBox

@@ -15,6 +15,8 @@ VariableIndex IndexVariables(const Graph& graph, const Stage& stage) {
   variables.first_free_pose = stage.first_free_pose;
   variables.first_pose = std::min(stage.first_free_pose, stage.end_pose);
   variables.end_pose = stage.end_pose;
+  variables.num_shared = graph.num_shared();
+  variables.moves_shared = stage.moves_shared;
   variables.slot_of_object.assign(graph.num_objects(), -1);
   for (const int row : stage.boxes) {
     variables.slot_of_object[graph.boxes.object[row]] = 0;

@@ -3,8 +3,9 @@
 // priors and its kinds of measurements.
 //
 // A visitor has two methods, both of which return false to stop:
-//   Visit(cost, blocks...)   gets a functor of costs/, and a PoseRow or an ObjectRow for each
-//   block. VisitBox(box)            gets a StageBox; VisitBoxCost() gives its cost.
+//   Visit(cost, blocks...)   gets a functor of costs/, and a PoseRow, an ObjectRow or a SharedRow
+//                            for each block.
+//   VisitBox(box)            gets a StageBox; VisitBoxCost() gives its cost.
 #pragma once
 
 #include <utility>
@@ -14,7 +15,9 @@
 #include "dqslam/costs/box.h"
 #include "dqslam/costs/measurements.h"
 #include "dqslam/costs/odometry.h"
+#include "dqslam/costs/placements.h"
 #include "dqslam/costs/scene_priors.h"
+#include "dqslam/costs/shared.h"
 #include "dqslam/costs/size_prior.h"
 #include "dqslam/costs/tangent.h"
 #include "dqslam/geometry/body.h"
@@ -30,6 +33,10 @@ PoseParameters<Pose> ParametersOf(PoseRow, const double* values) {
 }
 template <typename Pose>
 ObjectParameters ParametersOf(ObjectRow, const double* values) {
+  return {values};
+}
+template <typename Pose>
+SharedParameters ParametersOf(SharedRow, const double* values) {
   return {values};
 }
 
@@ -104,6 +111,51 @@ bool VisitPosePriors(const Mount& mount, const ScenePriors& scene, Visit&& visit
                                                                         scene.camera_height_sigma});
 }
 
+/// Calls visit with the model of an object, an EllipsoidModel or a BodyModel.
+template <typename Visit>
+bool VisitModel(Shape shape, Visit&& visit) {
+  return shape == Shape::kEllipsoid ? visit(EllipsoidModel()) : visit(RoundedModel(shape));
+}
+
+/// Visits the placements of the objects in a stage.  Returns false where a visit returned false.
+template <typename Visitor>
+bool VisitPlacements(const Graph& graph, const StageTerms& terms, Visitor* visitor) {
+  const PlacementTable& table = graph.placements;
+  const Eigen::Vector3d& up = graph.scene_priors.up;
+  const std::vector<int>& slots = terms.variables.slot_of_object;
+  for (int row = 0; row < table.size(); ++row) {
+    const ObjectRow object{table.object[row]}, other{table.other[row]};
+    if (slots[object.row] < 0 || (other.row >= 0 && slots[other.row] < 0)) continue;
+    const double distance = table.distance[row], sigma = table.sigma[row];
+    const Placement kind = table.kind[row];
+    const bool defined = VisitModel(ShapeOf(terms.shapes, object.row), [&](auto model) {
+      using Model = decltype(model);
+      if (kind == Placement::kUpright) {
+        return visitor->Visit(PlumbCost<Model>{{}, model, up, sigma}, object);
+      }
+      if (other.row < 0) {
+        const OnPlaneCost<Model> cost{{}, model, up, distance, sigma};
+        return visitor->Visit(cost, object, SharedRow{table.shared[row]});
+      }
+      return VisitModel(ShapeOf(terms.shapes, other.row), [&](auto other_model) {
+        using Other = decltype(other_model);
+        if (kind == Placement::kOn) {
+          const OnObjectCost<Model, Other> cost{{}, model, other_model, up, sigma};
+          return visitor->Visit(cost, object, other);
+        }
+        if (kind == Placement::kAligned) {
+          const AlignedCost<Model, Other> cost{{}, model, other_model, up, sigma};
+          return visitor->Visit(cost, object, other);
+        }
+        const BesideCost<Model, Other> cost{{}, model, other_model, up, distance, sigma};
+        return visitor->Visit(cost, object, other);
+      });
+    });
+    if (!defined) return false;
+  }
+  return true;
+}
+
 /// Visits all terms.  Returns false where a visit returned false.
 template <typename Pose, typename Landmark, typename Visitor>
 bool VisitTerms(const PreparedGraph& prepared, const StageTerms& terms, Visitor* visitor) {
@@ -142,13 +194,27 @@ bool VisitTerms(const PreparedGraph& prepared, const StageTerms& terms, Visitor*
       const double mean = graph.size_prior.log_mean[object];
       const double sigma = graph.size_prior.log_sigma[object];
       const Shape shape = ShapeOf(terms.shapes, object);
-      const auto visit = [&](const auto& cost) { return visitor->Visit(cost, ObjectRow{object}); };
+      const int shared = SharedOf(graph.size_prior.shared, object);
+      const auto visit = [&](const auto& cost) {
+        using Cost = std::decay_t<decltype(cost)>;
+        if constexpr (kIsSizePrior<Cost>) {
+          if (shared >= 0) {
+            const SharedMedianCost<Cost> with_shared{{}, cost};
+            return visitor->Visit(with_shared, ObjectRow{object}, SharedRow{shared});
+          }
+        }
+        return visitor->Visit(cost, ObjectRow{object});
+      };
       const bool defined =
           shape == Shape::kEllipsoid
               ? VisitObjectPriors(mean, sigma, graph.scene_priors, visit)
               : VisitBodyPriors(shape, mean, sigma, graph.scene_priors, upright, visit);
       if (!defined) return false;
     }
+    if (!VisitPlacements(graph, terms, visitor)) return false;
+  }
+  for (int row = 0; row < graph.num_shared(); ++row) {
+    if (!visitor->Visit(SharedPriorCost{{}, graph.shared_sigma[row]}, SharedRow{row})) return false;
   }
   return VisitPosePriors<Pose>(prepared.mount, graph.scene_priors, [&](const auto& cost) {
     for (int pose = terms.variables.first_free_pose; pose < terms.variables.end_pose; ++pose) {

@@ -7,6 +7,7 @@ namespace dqslam {
 std::vector<int> VariableIndex::BlockSizes() const {
   std::vector<int> sizes(num_free_poses(), tangent_size);
   sizes.insert(sizes.end(), num_objects(), kLandmarkSize);
+  if (moves_shared) sizes.insert(sizes.end(), num_shared, 1);
   return sizes;
 }
 
@@ -18,6 +19,9 @@ Eigen::VectorXd VariableIndex::Pack(const State& state) const {
   for (const int object : objects) {
     values.segment<kLandmarkSize>(Start(ObjectRow{object})) = state.landmarks.row(object);
   }
+  for (int row = 0; row < num_shared; ++row) {
+    values[Start(SharedRow{row})] = *state.SharedAt(row);
+  }
   return values;
 }
 
@@ -28,6 +32,7 @@ void VariableIndex::Unpack(const Eigen::VectorXd& values, State* state) const {
   for (const int object : objects) {
     state->landmarks.row(object) = values.segment<kLandmarkSize>(Start(ObjectRow{object}));
   }
+  state->shared = values.tail(num_shared);
 }
 
 }  // namespace dqslam

@@ -2,6 +2,7 @@
 
 from dqslam.assumptions.noise import BoxNoise as BoxNoise
 from dqslam.assumptions.noise import OdometryNoise as OdometryNoise
+from dqslam.assumptions.sizes import UNKNOWN_SIZE as UNKNOWN_SIZE
 from dqslam.assumptions.sizes import SizePrior as SizePrior
 from dqslam.assumptions.sizes import SizePriors as SizePriors
 from dqslam.assumptions.sizes import load_size_priors as load_size_priors

@@ -19,10 +19,18 @@ class SizePrior:
     """Natural logarithm of the median semi-axis in meters."""
     log_sigma: float = 0.7
     """Standard deviation of the logarithm."""
+    median_log_sigma: float = 0.0
+    """Standard deviation of `log_mean` itself. If it is not 0, the median is estimated with the
+    map, one for all objects that have this prior."""
 
     def of(self, class_name: str) -> Self:
         """Return the prior of a class: all have the same."""
         return self
+
+
+UNKNOWN_SIZE = SizePrior(median_log_sigma=float(np.log(10.0)))
+"""The default: two of three semi-axes are within a factor of 2 of a median that is estimated, and
+which is 0.3 m within a factor of 10."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +38,7 @@ class SizePriors:
     """Size priors by the name of the class, and one for all other classes."""
 
     classes: Mapping[str, SizePrior]
-    default: SizePrior = field(default_factory=SizePrior)
+    default: SizePrior = UNKNOWN_SIZE
 
     def of(self, class_name: str) -> SizePrior:
         """Return the prior of a class."""
@@ -48,9 +56,14 @@ class _Entry(BaseModel):
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
     median_m: Annotated[float, Field(gt=0.0)]
     spread: Annotated[float, Field(gt=1.0)]
+    median_spread: Annotated[float, Field(ge=1.0)] = 1.0
 
     def prior(self) -> SizePrior:
-        return SizePrior(float(np.log(self.median_m)), float(np.log(self.spread)))
+        return SizePrior(
+            float(np.log(self.median_m)),
+            float(np.log(self.spread)),
+            float(np.log(self.median_spread)),
+        )
 
 
 class _Table(BaseModel):
@@ -64,7 +77,9 @@ def load_size_priors(path: str | Path) -> SizePriors:
 
     It has a table ``[classes.NAME]`` for each class and may have a table ``[default]`` for all
     others. Each has ``median_m``, the median semi-axis in meters, and ``spread``, a factor above 1:
-    two of three semi-axes are between median / spread and median * spread.
+    two of three semi-axes are between median / spread and median * spread. It may have
+    ``median_spread``, a factor of 1 or above: by as much the median itself is uncertain, and it is
+    then estimated with the map.
 
     Raises
     ------
@@ -74,4 +89,4 @@ def load_size_priors(path: str | Path) -> SizePriors:
     """
     table = load_toml_model(path, _Table)
     classes = {name: entry.prior() for name, entry in table.classes.items()}
-    return SizePriors(classes, SizePrior() if table.default is None else table.default.prior())
+    return SizePriors(classes, UNKNOWN_SIZE if table.default is None else table.default.prior())

@@ -61,7 +61,7 @@ def check_calibration(
     """
     require(graph, Graph, "check_calibration", "call build_graph(recording) first")
     require(estimate, Estimate, "check_calibration", "estimate, summary = solve(graph)")
-    state = _core.State(estimate.poses, estimate.ellipsoids)
+    state = _core.State(estimate.poses, estimate.ellipsoids, shared=estimate.shared)
     scores = Scores.at(mapped_graph(graph, estimate), state, options or SolveOptions())
     allowed = [] if sizes_known else [scores.names.index("object_size")]
     nuisance = len(allowed)

@@ -106,7 +106,7 @@ def calibrated_covariances(
     require(estimate, Estimate, "calibrated_covariances", "estimate, summary = solve(graph)")
     options = options or SolveOptions()
     graph = mapped_graph(graph, estimate)
-    state = _core.State(estimate.poses, estimate.ellipsoids)
+    state = _core.State(estimate.poses, estimate.ellipsoids, shared=estimate.shared)
     values = np.zeros(len(calibration_parameters()))
     rows = parameter_rows([one.name for one in findings])
     values[rows] = [one.value for one in findings]

@@ -111,7 +111,7 @@ def solve_jointly(
     for _ in range(MAX_ROUNDS):
         estimate, summary = solve(calibrated, options, start=start)
         calibrated, graph = mapped_graph(calibrated, estimate), mapped_graph(graph, estimate)
-        state = _core.State(estimate.poses, estimate.ellipsoids)
+        state = _core.State(estimate.poses, estimate.ellipsoids, shared=estimate.shared)
         if is_late is None:
             is_late = are_late(calibrated, state, options, rows)
         scores = scores_at(calibrated, state, options, rows, is_late=is_late)

@@ -7,7 +7,7 @@ import numpy as np
 
 from dqslam import _core
 from dqslam._core import SolveOptions
-from dqslam.assumptions import BoxNoise, SizePrior
+from dqslam.assumptions import UNKNOWN_SIZE, BoxNoise, SizePrior
 from dqslam.graph import Graph, build_graph
 from dqslam.recording import Recording
 from dqslam.simulation.scenario import Scenario, WorldSettings
@@ -85,7 +85,7 @@ class Assumptions:
     """The assumptions about boxes and objects."""
 
     box_noise: BoxNoise = field(default_factory=BoxNoise)
-    size_prior: SizePrior = field(default_factory=SizePrior)
+    size_prior: SizePrior = UNKNOWN_SIZE
     shape: ShapeName = "ellipsoid"
 
     def graph(self, recording: Recording) -> Graph:
