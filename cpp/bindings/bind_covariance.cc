@@ -5,6 +5,7 @@
 #include "bindings.h"
 #include "dqslam/estimation/calibration.h"
 #include "dqslam/estimation/covariance.h"
+#include "dqslam/estimation/placement_misfits.h"
 
 namespace py = pybind11;
 using namespace pybind11::literals;
@@ -53,6 +54,12 @@ void BindCovariance(py::module_& m) {
         py::call_guard<py::gil_scoped_release>(),
         "Joint covariance of some poses and objects: k rows for each pose, then 9 rows for each "
         "object.");
+  m.def("placement_misfits",
+        &PlacementMisfits,
+        "graph"_a,
+        "options"_a,
+        "state"_a,
+        "Residual norm of each placement at a state, in sigmas and before its switch, shape (p,).");
 
   py::class_<Fit>(m, "Fit", "How well measurements fit an estimate.")
       .def_readonly("odometry_residuals",

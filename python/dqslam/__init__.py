@@ -16,6 +16,7 @@ if TYPE_CHECKING:  # the one list of public names, a line each: lazy_exports rea
     from dqslam import metrics as metrics
     from dqslam import online as online
     from dqslam import pipeline as pipeline
+    from dqslam import placements as placements
     from dqslam import places as places
     from dqslam import plot as plot
     from dqslam import simulation as simulation
@@ -47,8 +48,11 @@ if TYPE_CHECKING:  # the one list of public names, a line each: lazy_exports rea
     from dqslam.assumptions import UNKNOWN_SIZE as UNKNOWN_SIZE
     from dqslam.assumptions import BoxNoise as BoxNoise
     from dqslam.assumptions import OdometryNoise as OdometryNoise
+    from dqslam.assumptions import PlacementRule as PlacementRule
+    from dqslam.assumptions import PlacementRules as PlacementRules
     from dqslam.assumptions import SizePrior as SizePrior
     from dqslam.assumptions import SizePriors as SizePriors
+    from dqslam.assumptions import load_placements as load_placements
     from dqslam.assumptions import load_size_priors as load_size_priors
     from dqslam.calibration import CalibrationFinding as CalibrationFinding
     from dqslam.calibration import calibrated_covariances as calibrated_covariances
@@ -84,6 +88,9 @@ if TYPE_CHECKING:  # the one list of public names, a line each: lazy_exports rea
     from dqslam.pipeline import RunResult as RunResult
     from dqslam.pipeline import run as run
     from dqslam.pipeline import run_files as run_files
+    from dqslam.placements import Placements as Placements
+    from dqslam.placements import SupportPlane as SupportPlane
+    from dqslam.placements import solve_with_placements as solve_with_placements
     from dqslam.places import Alignment as Alignment
     from dqslam.places import CannotTellError as CannotTellError
     from dqslam.places import JointMap as JointMap

@@ -68,6 +68,7 @@ __all__: list[str] = [
     "joint_covariance",
     "log_semi_axes_jacobian",
     "minus",
+    "placement_misfits",
     "plus",
     "project_to_boxes",
     "project_to_outlines",
@@ -1492,6 +1493,13 @@ def minus(
 ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
     """
     Tangents (n, k) that move the origins to the poses.
+    """
+
+def placement_misfits(
+    graph: Graph, options: SolveOptions, state: State
+) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+    """
+    Residual norm of each placement at a state, in sigmas and before its switch, shape (p,).
     """
 
 def plus(

@@ -52,9 +52,7 @@ def only_objects(core: _core.Graph, kept: Bools) -> _core.Graph:
     )
 
 
-def _placements_of(
-    table: _core.PlacementTable, kept: Bools, row: Ints
-) -> _core.PlacementTable:
+def _placements_of(table: _core.PlacementTable, kept: Bools, row: Ints) -> _core.PlacementTable:
     part = kept[table.object] & ((table.other < 0) | kept[table.other])
     return _core.PlacementTable(
         kind=[kind for kind, keep in zip(table.kind, part, strict=True) if keep],

@@ -3,7 +3,7 @@
 The first pose is fixed, and everything is relative to it.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -54,6 +54,8 @@ class Marginals:
     """
     under_constrained: tuple[UnderConstrained, ...]
     """One entry for each pose and object with an undetermined parameter."""
+    shared: Floats = field(default_factory=lambda: np.zeros(0))
+    """Standard deviations of `Estimate.shared`, shape (s,)."""
 
     def __repr__(self) -> str:
         """Show the numbers of poses and objects, and of those that are under-constrained."""
@@ -222,6 +224,7 @@ def _marginals(
         poses=found.poses.reshape(-1, size, size),
         objects=found.objects.reshape(-1, 9, 9),
         under_constrained=tuple(_named(each, object_ids) for each in found.under_constrained),
+        shared=np.sqrt(found.shared),
     )
 
 

@@ -5,6 +5,7 @@
 #include "cost_checks.h"
 #include "dqslam/costs/shared.h"
 #include "dqslam/estimation/covariance.h"
+#include "dqslam/estimation/placement_misfits.h"
 #include "dqslam/estimation/solve.h"
 #include "random.h"
 #include "scene.h"
@@ -184,6 +185,10 @@ TEST(SharedNumbers, FindTheHeightOfAPlane) {
   const Eigen::RowVectorXd moved =
       solution.landmarks.row(objects - 1) - before.landmarks.row(objects - 1);
   EXPECT_LT(moved.head<3>().norm(), 0.02);
+  const State state{solution.poses, solution.landmarks, {}, {}, solution.shared};
+  const Eigen::VectorXd misfits = PlacementMisfits(graph, SolveOptions(), state);
+  EXPECT_LT(misfits.head(objects - 1).maxCoeff(), 1);
+  EXPECT_NEAR(misfits[objects - 1], 100, 5);  // 1 m, of 0.01 m
 }
 
 TEST(Placements, ThatNameNothingAreRefused) {

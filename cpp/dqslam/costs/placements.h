@@ -43,15 +43,21 @@ Standing<T> Stand(const Body<T>& object, const Vector3<T>& up) {
   return {object.center, object.factor * object.factor.transpose(), Width(object, up)};
 }
 
+inline constexpr double kSquaredBound = 9;
+
 /// Bounds the norm of a residual by 3, as a switch does where it does not fit.
 template <typename T>
 void BoundBySwitch(int size, T* residual) {
   using std::sqrt;
-  constexpr double kSquaredBound = 9;
   T squared(0);
   for (int i = 0; i < size; ++i) squared += residual[i] * residual[i];
   const T scale = T(1) / sqrt(T(1) + squared / T(kSquaredBound));
   for (int i = 0; i < size; ++i) residual[i] *= scale;
+}
+
+/// The norm of a residual before it was bounded.
+inline double NormBeforeSwitch(double bounded) {
+  return bounded / std::sqrt(1 - bounded * bounded / kSquaredBound);
 }
 
 template <typename Model>

@@ -2,6 +2,12 @@
 
 from dqslam.assumptions.noise import BoxNoise as BoxNoise
 from dqslam.assumptions.noise import OdometryNoise as OdometryNoise
+from dqslam.assumptions.placements import GROUND as GROUND
+from dqslam.assumptions.placements import PLANE as PLANE
+from dqslam.assumptions.placements import PlacementRule as PlacementRule
+from dqslam.assumptions.placements import PlacementRules as PlacementRules
+from dqslam.assumptions.placements import check_placement_classes as check_placement_classes
+from dqslam.assumptions.placements import load_placements as load_placements
 from dqslam.assumptions.sizes import UNKNOWN_SIZE as UNKNOWN_SIZE
 from dqslam.assumptions.sizes import SizePrior as SizePrior
 from dqslam.assumptions.sizes import SizePriors as SizePriors

@@ -1,7 +1,7 @@
 """Prior sizes of objects: one prior for all, or a table with one for each class."""
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Self
 
