@@ -32,8 +32,10 @@ def errors(estimate: dq.Estimate, truth: dq.Truth) -> tuple[float, float]:
 
 def measure_table(seeds: range) -> None:
     """Print the errors with and without the plane of a table, for arcs around it."""
-    print("| arc | poses, m | with the plane | centers, m | with the plane | height: error, sigma |")
-    print("|---|---|---|---|---|---|")
+    typer.echo(
+        "| arc | poses, m | with the plane | centers, m | with the plane | height: error, σ |"
+    )
+    typer.echo("|---|---|---|---|---|---|")
     orbit = dq.load_scenario("orbit")
     for turns, poses in ((1.5, 150), (0.3, 30), (0.15, 20)):
         scenario = orbit.model_copy(
@@ -52,7 +54,7 @@ def measure_table(seeds: range) -> None:
             heights += [(plane.height, plane.sigma) for plane in found.planes]
         before, after = np.mean(without, axis=0), np.mean(placed, axis=0)
         height, sigma = np.sqrt(np.mean(np.square(heights), axis=0))
-        print(
+        typer.echo(
             f"| {360 * turns:.0f}° | {before[0]:.4f} | {after[0]:.4f} | {before[1]:.4f} "
             f"| {after[1]:.4f} | {height:.4f}, {sigma:.4f} |"
         )
@@ -60,8 +62,8 @@ def measure_table(seeds: range) -> None:
 
 def measure_harm(seeds: range) -> None:
     """Print the errors in the paper's world where rules are wrong for a fifth of the objects."""
-    print("| wrong for 20 % | poses, m | centers, m |")
-    print("|---|---|---|")
+    typer.echo("| wrong for 20 % | poses, m | centers, m |")
+    typer.echo("|---|---|---|")
     rows: dict[str, list[tuple[float, float]]] = {"no rules": []} | {name: [] for name in WRONG}
     for seed in seeds:
         recording, truth = dq.simulate(dq.load_scenario("paper"), seed=seed)
@@ -80,7 +82,7 @@ def measure_harm(seeds: range) -> None:
             rows[name].append(errors(estimate, truth))
     for name, values in rows.items():
         poses, centers = np.mean(values, axis=0)
-        print(f"| {name} | {poses:.4f} | {centers:.4f} |")
+        typer.echo(f"| {name} | {poses:.4f} | {centers:.4f} |")
 
 
 def main(
@@ -90,7 +92,7 @@ def main(
     """Measure rules of placement: a table of unknown height, and rules that are wrong."""
     seeds = range(seed, seed + trials)
     measure_table(seeds)
-    print()
+    typer.echo("")
     measure_harm(seeds)
 
 

@@ -10,7 +10,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.random import Generator, default_rng
 
-from dqslam import Camera, Detections, Odometry, Recording, Truth, _core, load_scenario, simulate
+from dqslam import (
+    BoxNoise,
+    Camera,
+    Detections,
+    Odometry,
+    Recording,
+    SizePrior,
+    Truth,
+    _core,
+    load_scenario,
+    simulate,
+)
 from dqslam._checks import Bools, Floats, Ints
 from dqslam._core import PoseModel
 
@@ -25,6 +36,9 @@ _SIGMA_M, _LATERAL_SIGMA_M = 0.02, 0.005
 _SIGMA_RAD, _TURN_SIGMA_RAD = 0.02, 0.1
 _START_SIGMA_M = 0.3  # of the centers that peers start from
 BOX_SIGMA_PX = 1.0
+# What all programs and sessions assume, so that they have the same problem.
+NOISE = BoxNoise(pixels=BOX_SIGMA_PX, relative=0.0)
+SIZES = SizePrior()
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,8 +4,8 @@ import sys
 
 from benchmarks.exchange import Stopwatch, write_answer
 from benchmarks.files import load_problem
-from benchmarks.problems import BOX_SIGMA_PX
-from dqslam import BoxNoise, Summary, build_graph, solve
+from benchmarks.problems import NOISE, SIZES
+from dqslam import Summary, build_graph, solve
 
 
 def main(problem: str, answer: str) -> None:
@@ -13,7 +13,7 @@ def main(problem: str, answer: str) -> None:
     recording, _ = load_problem(problem)
     stopwatch = Stopwatch()
     with stopwatch("build"):
-        graph = build_graph(recording, box_noise=BoxNoise(pixels=BOX_SIGMA_PX, relative=0.0))
+        graph = build_graph(recording, box_noise=NOISE, size_prior=SIZES)
     with stopwatch("solve"):
         estimate, summary = solve(graph)
     write_answer(

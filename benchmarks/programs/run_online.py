@@ -11,11 +11,9 @@ import numpy as np
 
 from benchmarks.exchange import Stopwatch, peak_memory_mb, write_answer
 from benchmarks.files import load_problem
-from benchmarks.problems import BOX_SIGMA_PX
-from dqslam import BoxNoise, OnlineSlam, Recording, build_graph, solve, steps_of
+from benchmarks.problems import NOISE, SIZES
+from dqslam import OnlineSlam, Recording, build_graph, solve, steps_of
 from dqslam._checks import Floats
-
-NOISE = BoxNoise(pixels=BOX_SIGMA_PX, relative=0.0)
 
 
 def feed(recording: Recording) -> tuple[OnlineSlam, Floats, Floats]:
@@ -72,7 +70,7 @@ def show(case: str, seed: int = 0, noise: float | None = None) -> None:
     started = time.perf_counter()
     polished = slam.polish().result()
     polish_s = time.perf_counter() - started
-    estimate, summary = solve(build_graph(recording, box_noise=NOISE))
+    estimate, summary = solve(build_graph(recording, box_noise=NOISE, size_prior=SIZES))
 
     def rmse(poses: Floats) -> float:
         apart = (poses - problem.truth.poses)[:, :2]

@@ -12,8 +12,8 @@ import numpy as np
 
 from benchmarks.exchange import Stopwatch, write_answer
 from benchmarks.files import load_problem
-from benchmarks.problems import BOX_SIGMA_PX
-from dqslam import BoxNoise, Graph, _core, build_graph
+from benchmarks.problems import NOISE, SIZES
+from dqslam import Graph, _core, build_graph
 from dqslam._checks import Bools, Floats
 from dqslam._core import PoseModel
 
@@ -27,7 +27,7 @@ def main(problem: str, answer: str) -> None:
     recording, centers = load_problem(problem)
     stopwatch = Stopwatch()
     with stopwatch("build"):
-        graph = build_graph(recording, box_noise=BoxNoise(pixels=BOX_SIGMA_PX, relative=0.0))
+        graph = build_graph(recording, box_noise=NOISE, size_prior=SIZES)
         residuals = Residuals(graph)
         sparsity = residuals.sparsity()
     with stopwatch("start"):

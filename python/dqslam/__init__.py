@@ -29,6 +29,7 @@ if TYPE_CHECKING:  # the one list of public names, a line each: lazy_exports rea
     from dqslam._core import Minimizer as Minimizer
     from dqslam._core import Mode as Mode
     from dqslam._core import OnlineOptions as OnlineOptions
+    from dqslam._core import Placement as Placement
     from dqslam._core import PoseModel as PoseModel
     from dqslam._core import Residual as Residual
     from dqslam._core import ScenePriors as ScenePriors

@@ -12,7 +12,7 @@ from benchmarks.problems import BOX_SIGMA_PX, chain
 from benchmarks.programs import run_dqslam, run_scipy
 
 from bench import tiny
-from dqslam import BoxNoise, build_graph, solve
+from dqslam import BoxNoise, SizePrior, build_graph, solve
 
 
 def answer_of(program, problem, folder):
@@ -35,7 +35,7 @@ def test_programs_find_the_same_optimum(tmp_path):
 
 
 def test_residuals_in_numpy_are_those_of_the_core():
-    graph = build_graph(tiny().recording, box_noise=BoxNoise(pixels=1.0, relative=0.0))
+    graph = build_graph(tiny().recording, box_noise=BoxNoise(1.0, 0.0), size_prior=SizePrior())
     estimate, summary = solve(graph)
     residuals = run_scipy.Residuals(graph)
     parameters = residuals.pack(estimate.poses, estimate.ellipsoids)
@@ -48,7 +48,7 @@ def test_residuals_in_numpy_are_those_of_the_core():
 
 @pytest.mark.parametrize("use_boxes", [False, True])
 def test_sparsity_holds_every_derivative(use_boxes):
-    graph = build_graph(tiny().recording, box_noise=BoxNoise(pixels=1.0, relative=0.0))
+    graph = build_graph(tiny().recording, box_noise=BoxNoise(1.0, 0.0), size_prior=SizePrior())
     estimate, _ = solve(graph)
     residuals = run_scipy.Residuals(graph)
     parameters = residuals.pack(estimate.poses, estimate.ellipsoids)

@@ -113,7 +113,7 @@ def test_a_cost_is_known_to_few_files():
 def test_the_api_reference_has_every_public_name():
     page = (ROOT / "docs/api.md").read_text()
     documented = set(
-        re.findall(r"auto(?:class|function):: dqslam\.(\w+)$", page, flags=re.MULTILINE)
+        re.findall(r"auto(?:class|data|function):: dqslam\.(\w+)$", page, flags=re.MULTILINE)
     )
     assert documented == set(dqslam.__all__) - {"__version__"}
 

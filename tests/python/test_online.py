@@ -75,7 +75,7 @@ def test_one_box_puts_a_sphere_where_its_size_says(problem):
 
 
 def test_a_polish_finds_what_solve_finds(problem):
-    graph = build_graph(problem.recording, box_noise=NOISE)
+    graph = build_graph(problem.recording, box_noise=NOISE, size_prior=dq.SizePrior())
     estimate, summary = solve(graph, SolveOptions(loss=Loss.NONE))
     slam = fed(problem)
     polished = slam.polish().result()
@@ -103,8 +103,9 @@ def test_ranges_reach_a_session_as_they_reach_solve(problem):
     )
     recording = replace(problem.recording, positions=None, measurements=(ranges,))
     plain = SolveOptions(loss=Loss.NONE)
-    _, summary = solve(build_graph(recording, box_noise=NOISE), plain)
-    _, without = solve(build_graph(replace(recording, measurements=()), box_noise=NOISE), plain)
+    told = {"box_noise": NOISE, "size_prior": dq.SizePrior()}
+    _, summary = solve(build_graph(recording, **told), plain)
+    _, without = solve(build_graph(replace(recording, measurements=()), **told), plain)
     assert summary.final_cost > without.final_cost + 1.0
     slam = OnlineSlam(recording.camera, box_noise=NOISE)
     assert len(list(replay(slam, recording))) == len(recording.timestamps)
@@ -309,6 +310,6 @@ def test_in_se3_it_finds_what_solve_finds():
         first_pose=recording.odometry.first_pose,
     )
     assert len(list(replay(slam, recording))) == len(recording.timestamps)
-    _, summary = solve(build_graph(recording))
+    _, summary = solve(build_graph(recording, size_prior=dq.SizePrior()))
     assert slam.polish().result().cost == pytest.approx(summary.final_cost, rel=1e-6)
     np.testing.assert_allclose(np.linalg.norm(slam.poses[:, 3:], axis=1), 1.0, atol=1e-9)

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from dqslam import BoxNoise, SizePrior, SolveOptions, _core, load_scenario
+from dqslam import UNKNOWN_SIZE, BoxNoise, SizePrior, SolveOptions, _core, load_scenario
 from dqslam.studies.paper import run_paper
 from dqslam.studies.sweep import TrialSettings
 from dqslam.studies.sweep import trial as trial_module
@@ -32,7 +32,7 @@ def test_an_estimator_is_the_default_one_but_for_what_is_said():
     assert chosen.options(loss="none").loss == _core.Loss.NONE
     assert chosen.assumptions().box_noise == BoxNoise(3.0, BoxNoise().relative)
     assert chosen.assumptions().size_prior == SizePrior(math.log(0.5), 1.0)
-    assert settings().assumptions().size_prior == SizePrior()
+    assert settings().assumptions().size_prior == UNKNOWN_SIZE
 
 
 def test_a_file_has_a_word_for_each_option_of_the_solver():
