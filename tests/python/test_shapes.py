@@ -8,8 +8,8 @@ import pytest
 
 import dqslam as dq
 from dqslam.recording import Recording, Truth
-from dqslam.studies.paper.methods import Settings, assumptions_of
-from dqslam.uncertainty import normalized_squares
+from dqslam.studies.paper.methods import Settings, assumptions_of, method_options
+from dqslam.uncertainty import normalized_squares, true_state
 
 NOISE = dq.BoxNoise(pixels=1.0, relative=0.0)
 
@@ -129,3 +129,17 @@ def test_the_paper_is_told_true_sigmas_where_its_objects_have_their_own_shape() 
     assert told.size_prior.log_sigma == pytest.approx(np.log(sides).std(), abs=0.01)
     with pytest.raises(ValueError, match="no shapes but its quadrics"):
         Settings("paper", shape="cuboid")
+
+
+@pytest.mark.parametrize("seed", [19, 222])
+def test_a_body_that_has_bent_the_path_is_found_again(seed: int) -> None:
+    # In these drives, one cube first ends tilted in a minimum of its own, which bends the path.
+    paper = dq.load_scenario("paper")
+    settings = Settings(bound=True, shape="cuboid")
+    recording, truth = dq.simulate(paper, seed=seed)
+    graph = assumptions_of(paper, settings).graph(replace(recording, positions=None))
+    options = method_options(settings)
+    _, summary = dq.solve(graph, options)
+    _, from_truth = dq.solve(graph, options, start=true_state(graph, truth, options))
+    assert summary.converged
+    assert summary.final_cost < from_truth.final_cost + 0.2
