@@ -118,6 +118,24 @@ TEST_F(SolveFailures, SaysThatNoStepWasGood) {
   EXPECT_EQ(summary.final_cost, summary.initial_cost);
 }
 
+// Most boxes of an object are anywhere: the others fit, and the object's place is not certain.
+TEST_F(SolveFailures, SaysThatMostBoxesOfAnObjectDoNotFit) {
+  ASSERT_TRUE(Solve(scene_.graph, options_).summary.converged);
+  Random random(5);
+  Graph graph = scene_.graph;
+  BoxTable& boxes = graph.boxes;
+  int seen = 0;
+  for (int row = 0; row < boxes.size(); ++row) {
+    if (boxes.object[row] != 1 || seen++ % 3 == 0) continue;
+    const Eigen::Vector2d shift = random.UniformVector<2>(-300, 300);
+    boxes.box.row(row) += Eigen::RowVector4d(shift[0], shift[1], shift[0], shift[1]);
+  }
+  ASSERT_GE(seen, 6);
+  const Summary summary = Solve(graph, options_).summary;
+  EXPECT_FALSE(summary.converged);
+  EXPECT_EQ(summary.message, "most boxes of 1 object do not fit");
+}
+
 // Q* = I has no real surface, so that no tangent plane exists.
 TEST_F(SolveFailures, SaysThatTheStartIsUndefined) {
   options_.start = Start::kIdentity;

@@ -24,6 +24,8 @@ constexpr int kMaxRounds = 10;
 // that they are outliers, and where a robust loss is believed that they are.
 constexpr double kMostMisfits = 0.05, kMostOutliers = 0.5;
 constexpr double kSameCost = 10;  // half squared sigmas
+// More than half of the boxes of an object with so many must fit, or its place is not certain.
+constexpr int kSomeBoxes = 6;
 
 void ValidateOptions(const SolveOptions& options) {
   const auto require = [](bool good, const char* what) {
@@ -246,6 +248,20 @@ Summary SolveInAttempts(const SolveContext& context,
   return best;
 }
 
+// What speaks against objects under a robust loss: wrong ids look like this.
+std::string ObjectionToObjects(const PreparedGraph& prepared, const Mask& inliers) {
+  int misfits = 0;
+  for (const std::vector<int>& rows : prepared.boxes_of_object) {
+    const auto fit = std::count_if(rows.begin(), rows.end(), [&](int row) { return inliers[row]; });
+    if (static_cast<int>(rows.size()) >= kSomeBoxes &&
+        2 * fit < static_cast<std::ptrdiff_t>(rows.size()))
+      ++misfits;
+  }
+  if (misfits == 0) return "";
+  return "most boxes of " + std::to_string(misfits) + (misfits == 1 ? " object" : " objects") +
+         " do not fit";
+}
+
 }  // namespace
 
 Solution Solve(const Graph& graph,
@@ -273,6 +289,11 @@ Solution Solve(const Graph& graph,
   });
   solution.poses = state.poses;
   solution.inliers = solver.Inliers(state);
+  const std::string objection = ObjectionToObjects(prepared, solution.inliers);
+  if (IsRobust(options.loss) && solution.summary.converged && !objection.empty()) {
+    solution.summary.converged = false;
+    solution.summary.message = objection;
+  }
   solution.landmarks = state.landmarks;
   solution.shapes = state.shapes;
   solution.shared = state.shared;
