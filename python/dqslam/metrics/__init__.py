@@ -11,6 +11,7 @@ from dqslam.metrics.iou import box_iou as box_iou
 from dqslam.metrics.iou import ellipsoid_iou as ellipsoid_iou
 from dqslam.metrics.iou import match_boxes as match_boxes
 from dqslam.metrics.iou import reprojection_iou as reprojection_iou
+from dqslam.metrics.iou import solid_iou as solid_iou
 from dqslam.metrics.objects import Matches as Matches
 from dqslam.metrics.objects import center_errors as center_errors
 from dqslam.metrics.objects import match_by_id as match_by_id
