@@ -119,7 +119,8 @@ class Estimate:
         The third of a cylinder is along its axis.
         """
         half_lengths = np.full((len(self.object_ids), 3), np.nan)
-        half_lengths[self.is_body] = np.exp(self.landmarks[self.is_body, 3:6])
+        if self.object_shapes:
+            half_lengths[self.is_body] = np.exp(self.landmarks[self.is_body, 3:6])
         return half_lengths
 
     @property

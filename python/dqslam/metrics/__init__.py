@@ -18,6 +18,7 @@ from dqslam.metrics.objects import match_by_id as match_by_id
 from dqslam.metrics.objects import match_nearest as match_nearest
 from dqslam.metrics.objects import orientation_error as orientation_error
 from dqslam.metrics.objects import size_error as size_error
+from dqslam.metrics.outline import projected_edges as projected_edges
 from dqslam.metrics.outline import through_lens as through_lens
 from dqslam.metrics.outline import visible_outlines as visible_outlines
 from dqslam.metrics.simulation import Report as Report

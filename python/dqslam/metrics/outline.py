@@ -5,10 +5,11 @@ import numpy as np
 from dqslam import _core
 from dqslam._checks import Floats, Ints
 from dqslam.lens import recorded_pixels
-from dqslam.solids import Solids, project_to_outlines
+from dqslam.solids import Solids, project_to_outlines, wireframe
 
 # The lens model is used up to this share of the image's size outside of the image.
 _AROUND = 0.5
+_EDGE_POINTS = 17
 
 
 def visible_outlines(
@@ -44,6 +45,34 @@ def visible_outlines(
     distance = np.linalg.norm(solids.centers[rows] - world_from_camera[:3], axis=1)
     rows = rows[np.argsort(-distance, kind="stable")]
     return rows, outlines[rows]
+
+
+def projected_edges(
+    camera: _core.Camera,
+    world_from_camera: Floats,
+    solids: Solids,
+    row: int,
+    *,
+    lens: bool = False,
+) -> list[Floats]:
+    """Return the edges of a cuboid or a cylinder in the image of a pose, (k, 2) pixels each.
+
+    There are none of an ellipsoid, which is its outline. All of the solid must be in front of the
+    camera, which has no mount. With ``lens``, pixels are those of the image as recorded.
+    """
+    from scipy.spatial.transform import Rotation
+
+    if not solids.is_body[row]:
+        return []
+    turn = Rotation.from_quat(world_from_camera[3:])
+    share = np.linspace(0.0, 1.0, _EDGE_POINTS)[:, None]
+    edges = []
+    for line in wireframe(solids, row):
+        dense = line if len(line) > 2 else line[0] + share * (line[1] - line[0])
+        points = turn.inv().apply(dense - world_from_camera[:3])
+        pixels = points[:, :2] / points[:, 2:] * [camera.fx, camera.fy] + [camera.cx, camera.cy]
+        edges.append(through_lens(camera, pixels) if lens else pixels)
+    return edges
 
 
 def through_lens(camera: _core.Camera, outlines: Floats) -> Floats:

@@ -110,6 +110,11 @@ def write_estimate(
         write_covariances(directory / "covariance.csv", estimate, marginals.poses)
 
 
+def _shape_of(estimate: Estimate, row: int) -> str:
+    shapes = estimate.object_shapes
+    return (shapes[row] if shapes else _core.Shape.ELLIPSOID).name.lower()
+
+
 def _object(estimate: Estimate, row: int, marginals: Covariances | None) -> dict[str, Any]:
     """Describe one object; shape and axes are null if its dual quadric is no ellipsoid."""
     semi_axes, orientation = None, None
@@ -118,7 +123,7 @@ def _object(estimate: Estimate, row: int, marginals: Covariances | None) -> dict
     described = {
         "id": int(estimate.object_ids[row]),
         "class_name": estimate.class_names[row],
-        "shape": None if semi_axes is None else estimate.solids.shapes[row].name.lower(),
+        "shape": None if semi_axes is None else _shape_of(estimate, row),
         "center": estimate.centers[row],
         "semi_axes": semi_axes,
         "orientation_xyzw": orientation,
