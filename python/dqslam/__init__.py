@@ -45,9 +45,11 @@ if TYPE_CHECKING:  # the one list of public names, a line each: lazy_exports rea
     from dqslam.association import Association as Association
     from dqslam.association import associate as associate
     from dqslam.assumptions import BoxNoise as BoxNoise
+    from dqslam.assumptions import ClassShapes as ClassShapes
     from dqslam.assumptions import OdometryNoise as OdometryNoise
     from dqslam.assumptions import SizePrior as SizePrior
     from dqslam.assumptions import SizePriors as SizePriors
+    from dqslam.assumptions import load_shapes as load_shapes
     from dqslam.assumptions import load_size_priors as load_size_priors
     from dqslam.calibration import CalibrationFinding as CalibrationFinding
     from dqslam.calibration import calibrated_covariances as calibrated_covariances
