@@ -21,10 +21,18 @@ def show_report(output: Output, report: dict[str, Any]) -> None:
         lines.append("no object fits a world at rest: the trajectory is the odometry")
     else:
         lines.append(_solver(report["solver"]))
+    lines += _shapes(report["shapes"])
     for line in lines:
         output.line(line)
     for warning in report["warnings"]:
         output.warn(warning)
+
+
+def _shapes(shapes: dict[str, Any] | None) -> list[str]:
+    """Say which objects remained ellipsoids, though another shape was told or fits better."""
+    if shapes is None:
+        return []
+    return [f"object {name} is an ellipsoid: {why}" for name, why in shapes["rejected"].items()]
 
 
 def _dropped(report: dict[str, Any]) -> list[tuple[str, str]]:
@@ -144,10 +152,13 @@ def _objects(objects: list[dict[str, Any]]) -> "Table":
 
     table = Table(box=SIMPLE_HEAD)
     headings = ("id", "class", "boxes", "center [m]", "± [m]", "size [m]", "chi-square", "outliers")
+    has_shapes = any(entry["shape"] not in (None, "ellipsoid") for entry in objects)
+    if has_shapes:
+        headings = (*headings[:6], "shape", *headings[6:])
     for heading in headings:
-        table.add_column(heading, justify="left" if heading == "class" else "right")
+        table.add_column(heading, justify="left" if heading in ("class", "shape") else "right")
     for entry in objects:
-        sigma, axes = entry["center_sigma_m"], entry["semi_axes_m"]
+        sigma, axes = entry["center_sigma_m"], entry["half_lengths_m"] or entry["semi_axes_m"]
         table.add_row(
             str(entry["id"]) if entry["doubt"] is None else f"{entry['id']} ?",
             escape(entry["class_name"]),
@@ -155,6 +166,7 @@ def _objects(objects: list[dict[str, Any]]) -> "Table":
             " ".join(f"{value:.3g}" for value in entry["center_m"]),
             "unknown" if sigma is None else f"{sigma:.2g}",
             "unknown" if None in axes else " x ".join(f"{2.0 * axis:.2g}" for axis in axes),
+            *([entry["shape"] or "none"] if has_shapes else []),
             "none" if entry["chi2_median"] is None else f"{entry['chi2_median']:.2f}",
             "none" if entry["outlier_share"] is None else f"{entry['outlier_share']:.0%}",
         )
