@@ -21,18 +21,21 @@ def show_report(output: Output, report: dict[str, Any]) -> None:
         lines.append("no object fits a world at rest: the trajectory is the odometry")
     else:
         lines.append(_solver(report["solver"]))
-    lines += _shapes(report["shapes"])
     for line in lines:
         output.line(line)
     for warning in report["warnings"]:
         output.warn(warning)
 
 
-def _shapes(shapes: dict[str, Any] | None) -> list[str]:
-    """Say which objects remained ellipsoids, though another shape was told or fits better."""
-    if shapes is None:
-        return []
-    return [f"object {name} is an ellipsoid: {why}" for name, why in shapes["rejected"].items()]
+def _shapes(shapes: dict[str, Any]) -> str:
+    found = list(shapes["shapes"].values())
+    counts = ", ".join(f"{found.count(name)} {name}s" for name in ("cuboid", "cylinder"))
+    if not shapes["rejected"]:
+        return counts
+    return (
+        f"{counts}; {len(shapes['rejected'])} objects might be one, but boxes that took no part do "
+        "not show it"
+    )
 
 
 def _dropped(report: dict[str, Any]) -> list[tuple[str, str]]:
@@ -65,6 +68,8 @@ def _overview(report: dict[str, Any]) -> "Table":
             f"median {boxes['chi2_median']:.2f} (3.36 expected); {boxes['outlier_share']:.1%} do "
             f"not fit (above 13.28), {boxes['not_in_front']} of them not even in front",
         )
+    if report["shapes"] is not None:
+        table.add_row("shapes", _shapes(report["shapes"]))
     table.add_row("re-projection", _reprojection(report["reprojection"]))
     table.add_row("noise of a box edge", _box_noise(report["box_noise"]))
     table.add_row("odometry noise", _noise(report["odometry_noise"]))

@@ -35,6 +35,7 @@ from dqslam.pipeline.report import (
     warn_of_doubtful,
     warn_of_evidence,
 )
+from dqslam.pipeline.shape_choice import warn_of_shapes
 from dqslam.recording import Detections
 from dqslam.uncertainty import Marginals
 
@@ -147,6 +148,7 @@ def conclude(
             *warn_of_evidence(output.evidence),
             *warn_of_doubtful(estimate),
             *warn_of_contradictions(estimate),
+            *warn_of_shapes(output.shapes),
             *warn_of_bent_poses(output.marginals),
             *warn_of_calibration(output.calibration),
         ],

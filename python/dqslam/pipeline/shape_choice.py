@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -22,10 +23,11 @@ FEWEST_BOXES = 10
 MOST_BOXES = 120
 # Parts of an object's boxes, in the order of the path, that are fitted and predicted in turn.
 BLOCKS = 6
-# The log likelihood of boxes that took no part must be higher by this for an object, ...
-LEAST_GAIN = 2.0
-# ... or by this for the objects of its class together, if its own boxes do not speak against it.
-LEAST_GAIN_OF_CLASS = 6.0
+# The log likelihood of boxes that took no part must be higher by this for an object. Seen from one
+# side, things gain less, and their cuboids are turned and proportioned by chance.
+LEAST_GAIN = 5.0
+# Where this share of the objects of its class gain so much, an object may lose as much as that.
+MOST_OF_CLASS, MOST_LOSS = 0.5, 1.0
 # A shape that was told is given up where the boxes say so clearly.
 GIVEN_UP = -10.0
 
@@ -42,7 +44,9 @@ class ShapeChoice:
     """Log likelihood of boxes that took no part against the ellipsoid, shape (o,); NaN where it was
     not tested."""
     rejected: dict[int, str] = field(default_factory=dict)
-    """Why objects for which another shape was told or fits better are ellipsoids, by id."""
+    """Why objects whose own boxes fit another shape better are ellipsoids, by id."""
+    given_up: dict[int, str] = field(default_factory=dict)
+    """Why objects for which another shape was told are ellipsoids, by id."""
 
     @property
     def is_body(self) -> Bools:
@@ -70,21 +74,22 @@ def choose_shapes(
     gains = np.full(len(shapes), np.nan)
     if tested.size:
         gains[tested] = _gains(core, state, shapes, tested, solver)
-    rejected = {}
-    of_class: dict[tuple[str, Shape], float] = defaultdict(float)
+    reasons: tuple[dict[int, str], dict[int, str]] = ({}, {})
+    of_class: dict[tuple[str, Shape], list[float]] = defaultdict(list)
     for row in tested.tolist():
-        of_class[graph.class_names[row], shapes[row]] += gains[row]
+        of_class[graph.class_names[row], shapes[row]].append(gains[row])
     for row in np.flatnonzero(is_body).tolist():
-        together = of_class[graph.class_names[row], shapes[row]]
+        alike = np.array(of_class[graph.class_names[row], shapes[row]])
+        is_usual = len(alike) > 1 and bool(np.mean(alike >= LEAST_GAIN) >= MOST_OF_CLASS)
         why = (
             _why_not_told(shapes[row], gains[row])
             if is_told[row]
-            else _why_not_found(shapes[row], gains[row], together, int(counts[row]))
+            else _why_not_found(shapes[row], gains[row], is_usual, int(counts[row]))
         )
         if why is not None:
-            rejected[int(graph.object_ids[row])] = why
+            reasons[int(is_told[row])][int(graph.object_ids[row])] = why
             shapes[row] = Shape.ELLIPSOID
-    return ShapeChoice(graph.object_ids, tuple(shapes), gains, rejected)
+    return ShapeChoice(graph.object_ids, tuple(shapes), gains, *reasons)
 
 
 def _why_not_told(shape: Shape, gain: float) -> str | None:
@@ -97,11 +102,11 @@ def _why_not_told(shape: Shape, gain: float) -> str | None:
     )
 
 
-def _why_not_found(shape: Shape, gain: float, of_class: float, boxes: int) -> str | None:
+def _why_not_found(shape: Shape, gain: float, is_usual: bool, boxes: int) -> str | None:
     """Say why an object is an ellipsoid though another shape fits its boxes better."""
     if np.isnan(gain):
         return f"{boxes} boxes are too few to tell that it is a {shape.name.lower()}"
-    if gain >= LEAST_GAIN or (gain > 0.0 and of_class >= LEAST_GAIN_OF_CLASS):
+    if gain >= LEAST_GAIN or (is_usual and gain >= -MOST_LOSS):
         return None
     return (
         f"a {shape.name.lower()} does not predict its boxes much better "
@@ -123,7 +128,14 @@ def describe_shapes(choice: ShapeChoice) -> dict[str, Any]:
             if np.isfinite(gain)
         },
         "rejected": {str(object_id): why for object_id, why in choice.rejected.items()},
+        "given_up": {str(object_id): why for object_id, why in choice.given_up.items()},
     }
+
+
+def warn_of_shapes(shapes: Mapping[str, Any] | None) -> list[str]:
+    """Name the objects that are ellipsoids though another shape was told."""
+    given_up = {} if shapes is None else shapes["given_up"]
+    return [f"object {name} is an ellipsoid: {why}" for name, why in given_up.items()]
 
 
 def _gains(
