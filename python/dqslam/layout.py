@@ -32,9 +32,9 @@ def shapes_of(
         return []
     if isinstance(given, _core.Shape):
         return [given] * len(class_names)
-    classes, default = given, _core.Shape.ELLIPSOID
-    if isinstance(given, ClassShapes):
-        classes, default = given.classes, given.default
+    if not isinstance(given, ClassShapes):
+        given = ClassShapes(given)
+    classes, default = given.classes, given.default
     for name in classes:
         if name not in detections.class_names.values():
             names = ", ".join(sorted(set(detections.class_names.values())))

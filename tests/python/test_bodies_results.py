@@ -62,7 +62,9 @@ def test_each_object_says_its_shape(folder):
     assert objects[0]["half_lengths"] == pytest.approx(planted.HALF_LENGTHS.tolist())
     assert "half_lengths" not in objects[2]
     # The semi-axes are those of the ellipsoid with the same moments, and so are their sigmas.
-    assert objects[0]["semi_axes"] == pytest.approx((np.sqrt(5 / 3) * planted.HALF_LENGTHS).tolist())
+    assert objects[0]["semi_axes"] == pytest.approx(
+        (np.sqrt(5 / 3) * planted.HALF_LENGTHS).tolist()
+    )
     assert objects[0]["log_semi_axes_sigma"] == pytest.approx([0.1, 0.2, 0.3])
 
 

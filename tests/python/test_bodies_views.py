@@ -100,9 +100,7 @@ def test_foxglove_has_cubes_and_cylinders(results, tmp_path):
     write_mcap(build_scene(results), tmp_path / "map.mcap")
     messages, _ = read(tmp_path / "map.mcap")
     ((_, update),) = messages["/map"]
-    counts = [
-        (len(one.cubes), len(one.cylinders), len(one.spheres)) for one in update.entities
-    ]
+    counts = [(len(one.cubes), len(one.cylinders), len(one.spheres)) for one in update.entities]
     assert counts == [(1, 0, 0), (0, 1, 0), (0, 0, 1)]
     primitives = [update.entities[0].cubes[0], update.entities[1].cylinders[0]]
     for row, one in enumerate(primitives):
@@ -127,10 +125,11 @@ def test_pages_draw_bodies(results, tmp_path):
             pose = results.poses[-1]
             for row in range(2):
                 polygon = page.evaluate(
-                    """(row) => geometry.outlineOfObject(geometry.viewOf(scene.estimate.at(-1)),
-                        scene.camera, scene.objects[row],
-                        geometry.shapeOf(scene.objects[row].semiAxes, scene.objects[row].orientation)
-                    ).polygon""",
+                    """(row) => {
+                      const one = scene.objects[row], view = geometry.viewOf(scene.estimate.at(-1));
+                      const shape = geometry.shapeOf(one.semiAxes, one.orientation);
+                      return geometry.outlineOfObject(view, scene.camera, one, shape).polygon;
+                    }""",
                     row,
                 )
                 surface = planted.pixels(row, pose)

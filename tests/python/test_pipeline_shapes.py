@@ -59,7 +59,7 @@ def test_the_report_says_what_speaks_for_a_shape(found: dq.RunResult) -> None:
 
 
 def test_the_noise_of_bodies_is_what_their_boxes_show(found: dq.RunResult) -> None:
-    """The detector's is 1 px; ellipsoids need 2 px and 5 % of the side. Now the boxes weigh more."""
+    """The detector's is 1 px, and ellipsoids need 2 px and 5 % of the side."""
     assert 1.0 < found.report["boxes"]["chi2_median"] < 5.0
     assert found.marginals is not None
     lengths = found.marginals.objects[found.estimate.is_body][:, 3:6, 3:6]

@@ -64,9 +64,7 @@ def test_boxes_are_those_of_the_surface(seed):
         size = np.ptp(pixels, axis=0).max()
         np.testing.assert_allclose(boxes[row], expected, atol=0.007 * size)  # rounded edges
         outline = outlines[row]
-        np.testing.assert_allclose(
-            [*outline.min(axis=0), *outline.max(axis=0)], expected, atol=0.3
-        )
+        np.testing.assert_allclose([*outline.min(axis=0), *outline.max(axis=0)], expected, atol=0.3)
         np.testing.assert_allclose(outline[0], outline[-1], atol=1e-9)
         # The outline is convex and around all of the surface.
         area = ConvexHull(pixels).volume
@@ -169,7 +167,9 @@ def test_chi_squares_are_those_that_the_estimator_minimizes(shape):
 def test_volumes_moments_and_supports():
     solids = solids_of()
     product = AXES.prod()
-    np.testing.assert_allclose(solids.volumes, [4 / 3 * np.pi * product, 8 * product, 2 * np.pi * product])
+    np.testing.assert_allclose(
+        solids.volumes, [4 / 3 * np.pi * product, 8 * product, 2 * np.pi * product]
+    )
     random = np.random.default_rng(0)
     direction = np.array([0.6, 0.0, 0.8])
     for row in range(3):
@@ -229,10 +229,18 @@ def test_meshes_are_closed_and_turned_outward(shape):
     signed = np.einsum("ni,ni->n", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6
     inscribed = {Shape.ELLIPSOID: 0.98, Shape.CUBOID: 1.0, Shape.CYLINDER: 0.993}[shape]
     assert signed.sum() == pytest.approx(inscribed * solids.volumes[0], rel=5e-3)
-    edges = np.vstack([surface_mesh.triangles[:, [0, 1]], surface_mesh.triangles[:, [1, 2]], surface_mesh.triangles[:, [2, 0]]])
+    edges = np.vstack(
+        [
+            surface_mesh.triangles[:, [0, 1]],
+            surface_mesh.triangles[:, [1, 2]],
+            surface_mesh.triangles[:, [2, 0]],
+        ]
+    )
     directed, counts = np.unique(edges, axis=0, return_counts=True)
     assert (counts == 1).all()
-    assert {tuple(edge) for edge in directed.tolist()} == {tuple(e[::-1]) for e in directed.tolist()}
+    assert {tuple(edge) for edge in directed.tolist()} == {
+        tuple(e[::-1]) for e in directed.tolist()
+    }
 
 
 def test_wireframes_and_outlines_from_above():

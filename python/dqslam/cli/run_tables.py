@@ -156,10 +156,10 @@ def _objects(objects: list[dict[str, Any]]) -> "Table":
     from rich.table import Table
 
     table = Table(box=SIMPLE_HEAD)
-    headings = ("id", "class", "boxes", "center [m]", "± [m]", "size [m]", "chi-square", "outliers")
+    headings = ["id", "class", "boxes", "center [m]", "± [m]", "size [m]", "chi-square", "outliers"]
     has_shapes = any(entry["shape"] not in (None, "ellipsoid") for entry in objects)
     if has_shapes:
-        headings = (*headings[:6], "shape", *headings[6:])
+        headings.insert(6, "shape")
     for heading in headings:
         table.add_column(heading, justify="left" if heading in ("class", "shape") else "right")
     for entry in objects:

@@ -36,7 +36,8 @@ def evaluate_objects(
     """Match the objects of a map with the true ones, and compare each pair.
 
     A true object stands for the solid of the same shape as the estimated one that is inscribed in
-    its box, with half-lengths of half its sizes. Values that the truth does not have, or that no pair has, are None.
+    its box, with half-lengths of half its sizes. Values that the truth does not have, or that no
+    pair has, are None.
 
     Parameters
     ----------

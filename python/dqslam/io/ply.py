@@ -55,7 +55,8 @@ def _lines(
         "property double x\nproperty double y\nproperty double z\n"
         "property uchar red\nproperty uchar green\nproperty uchar blue\n"
         "property int object_id\n"
-        f"element face {sum(len(one.triangles) for one in meshes)}\nproperty list uchar int vertex_indices\n"
+        f"element face {sum(len(one.triangles) for one in meshes)}\n"
+        "property list uchar int vertex_indices\n"
         f"element edge {max(len(path) - 1, 0)}\nproperty int vertex1\nproperty int vertex2\n"
         "end_header\n"
     )

@@ -52,9 +52,7 @@ def reprojection_iou(
     not compared, because they are outside the image. The IoU is 0 where the solid is not
     strictly in front of the camera.
     """
-    predicted, visible = project_to_boxes(
-        _core.PoseModel.SE3, camera, world_from_camera, solids
-    )
+    predicted, visible = project_to_boxes(_core.PoseModel.SE3, camera, world_from_camera, solids)
     predicted = np.where(visible[:, None], predicted, boxes)
     low, high = predicted[:, :2], predicted[:, 2:]
     low = np.where(truncated[:, :2], np.maximum(low, boxes[:, :2]), low)
@@ -64,7 +62,7 @@ def reprojection_iou(
 
 
 def ellipsoid_iou(ellipsoid: Floats, other: Floats, *, samples: int = 4096, seed: int = 0) -> float:
-    """Return the IoU of two ellipsoids, each center and log-Cholesky shape (9,); see `solid_iou`."""
+    """Return the IoU of two ellipsoids, each center and log-Cholesky shape (9,); `solid_iou`."""
     one, two = (Solids.of_ellipsoids(each[None]) for each in (ellipsoid, other))
     return solid_iou(one, two, samples=samples, seed=seed)
 

@@ -53,9 +53,7 @@ def overlap_with_map(
     for pose in np.unique(boxes.pose):
         rows = np.flatnonzero(boxes.pose == pose)
         here = np.repeat(estimate.poses[pose][None], len(real), axis=0)
-        predicted, in_front = project_to_boxes(
-            estimate.pose_model, estimate.camera, here, solids
-        )
+        predicted, in_front = project_to_boxes(estimate.pose_model, estimate.camera, here, solids)
         predicted = _inside(estimate.camera, np.where(in_front[:, None], predicted, -2.0))
         table = box_iou(boxes.box[rows][:, None], predicted[None])
         claimed = boxes.object_id[rows][:, None]

@@ -20,8 +20,8 @@ from dqslam.pipeline.hold_out import choose_held_out
 from dqslam.pipeline.lens import widened
 from dqslam.pipeline.measurements import usable_measurements, with_measurements
 from dqslam.pipeline.online import estimate_online
-from dqslam.pipeline.shapes import with_shapes
 from dqslam.pipeline.options import Progress, RunOptions
+from dqslam.pipeline.shapes import with_shapes
 from dqslam.recording import Recording
 
 

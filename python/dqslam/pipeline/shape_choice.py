@@ -14,7 +14,7 @@ from dqslam._checks import Bools, Floats, Ints
 from dqslam._core import Shape
 from dqslam.association import CHI2_GATE
 from dqslam.graph import Graph
-from dqslam.solids import Solids, body_solids, box_chi_squares
+from dqslam.solids import Rows, Solids, body_solids, box_chi_squares
 from dqslam.subgraph import only_objects, rebuilt
 
 # A shape is chosen for objects with at least so many boxes, half of which must predict the others.
@@ -30,6 +30,8 @@ LEAST_GAIN = 5.0
 MOST_OF_CLASS, MOST_LOSS = 0.5, 1.0
 # A shape that was told is given up where the boxes say so clearly.
 GIVEN_UP = -10.0
+
+_OTHER = {Shape.CUBOID: Shape.CYLINDER, Shape.CYLINDER: Shape.CUBOID}
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +76,14 @@ def choose_shapes(
     gains = np.full(len(shapes), np.nan)
     if tested.size:
         gains[tested] = _gains(core, state, shapes, tested, solver)
+    # Own boxes tell a cuboid from a cylinder less well than boxes that took no part.
+    free = tested[~is_told[tested]]
+    if free.size:
+        others = [_OTHER.get(shape, shape) for shape in shapes]
+        of_others = _gains(core, state, others, free, solver)
+        for row, gain in zip(free.tolist(), of_others.tolist(), strict=True):
+            if gain > gains[row]:
+                shapes[row], gains[row] = others[row], gain
     reasons: tuple[dict[int, str], dict[int, str]] = ({}, {})
     of_class: dict[tuple[str, Shape], list[float]] = defaultdict(list)
     for row in tested.tolist():
@@ -194,10 +204,10 @@ def _chi_squares(core: _core.Graph, poses: Floats, solids: Solids) -> Floats:
         boxes.covariance,
         boxes.truncated,
     )
-    return np.minimum(chi2, CHI2_GATE[4])
+    return np.asarray(np.minimum(chi2, CHI2_GATE[4]))
 
 
-def _evenly(box_object: Ints, most: int) -> Ints:
+def _evenly(box_object: Rows, most: int) -> Ints:
     """Return rows of boxes (b,), at most so many of each object, evenly spread."""
     rows = []
     for one in np.unique(box_object):
@@ -206,7 +216,7 @@ def _evenly(box_object: Ints, most: int) -> Ints:
     return np.sort(np.concatenate(rows)) if rows else np.zeros(0, dtype=np.int64)
 
 
-def _second_half(box_object: Ints) -> Bools:
+def _second_half(box_object: Rows) -> Bools:
     """Return which boxes are in every second part of the boxes of their object, shape (b,)."""
     second = np.zeros(len(box_object), dtype=np.bool_)
     for one in np.unique(box_object):

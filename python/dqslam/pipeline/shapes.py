@@ -80,7 +80,7 @@ def _with_poses(
     graph: Graph,
     state: _core.State,
 ) -> EstimatorOutput | None:
-    """Return the estimate of poses and objects in their shapes; None where the poses are to stay."""
+    """Return the estimate of poses and objects in their shapes; None if the poses are to stay."""
     if (
         options.mode == _core.Mode.MAPPING
         or output.repeated is not None
@@ -94,7 +94,7 @@ def _with_poses(
     found, summary = solve(graph, solver, start=state)
     if found.dropped:
         return None
-    noise = {}
+    noise: dict[int, BoxNoise] = {}
     if options.box_noise is None:
         graph, noise = _with_noise_of_bodies(graph, found, output.box_noise)
         start = _core.State(found.poses, found.landmarks, list(found.object_shapes))
@@ -114,7 +114,9 @@ def _with_poses(
         estimate=estimate,
         marginals=marginals,
         summary=summary,
-        object_noise=tuple(noise.get(one, output.box_noise) for one in estimate.object_ids.tolist()),
+        object_noise=tuple(
+            noise.get(one, output.box_noise) for one in estimate.object_ids.tolist()
+        ),
     )
 
 
@@ -178,7 +180,9 @@ def _at_known_poses(
     fitted = marginal_covariances(graph, found, solver)
     plain = replace(graph, core=rebuilt(graph.core, shapes=[]))
     ellipsoids = replace(
-        found, object_shapes=(), ellipsoids=state.landmarks[np.isin(graph.object_ids, found.object_ids)]
+        found,
+        object_shapes=(),
+        ellipsoids=state.landmarks[np.isin(graph.object_ids, found.object_ids)],
     )
     known = marginal_covariances(plain, ellipsoids, solver)
     objects = marginals.objects.copy()

@@ -32,8 +32,8 @@ class Overlay:
     """One image at a time, with the objects of the map.
 
     Outlines of objects with a box in the image are thick and have a name on a tab of their color,
-    and of cuboids and cylinders the edges, too. The others are dashed, because the objects may be occluded. Boxes are thin. Those without
-    an object are white.
+    and of cuboids and cylinders the edges, too. The others are dashed, because the objects may be
+    occluded. Boxes are thin. Those without an object are white.
     """
 
     def __init__(self, results: Results) -> None:
@@ -85,9 +85,7 @@ class Overlay:
                 unmapped="white",
             )
         here = self._results.poses[pose]
-        rows, outlines = visible_outlines(
-            self._results.camera, here, self._solids, lens=True
-        )
+        rows, outlines = visible_outlines(self._results.camera, here, self._solids, lens=True)
         seen = np.isin(rows, detected)
         for row, outline, is_detected in zip(rows, outlines, seen, strict=True):
             self._draw_object(axes, int(row), outline, is_detected=bool(is_detected))

@@ -61,7 +61,7 @@ def wireframe(solids: Solids, row: int) -> list[Floats]:
         for at in 2.0 * np.pi * np.arange(_RULINGS) / _RULINGS:
             lines.append(np.array([[np.cos(at), np.sin(at), end] for end in (-1.0, 1.0)]))
     else:
-        lines = [np.column_stack(np.roll([*circle, zero], k, axis=0)) for k in range(3)]
+        lines = [np.roll([*circle, zero], k, axis=0).T for k in range(3)]
     return [line @ solids.factors[row].T + solids.centers[row] for line in lines]
 
 

@@ -9,6 +9,7 @@ from dqslam._checks import Floats
 from dqslam.solids.projection import in_camera
 from dqslam.solids.solids import Solids, hull_points
 
+
 def project_to_outlines(
     model: _core.PoseModel,
     camera: _core.Camera,

@@ -1,7 +1,7 @@
 """Boxes of solids in the image, and how well detected boxes fit them.
 
-The core projects ellipsoids, and solves problems with bodies. Here are the boxes that it predicts for
-cuboids and cylinders, with edges as little rounded as in its ``body.h``.
+The core projects ellipsoids, and solves problems with bodies. Here are the boxes that it predicts
+for cuboids and cylinders, with edges as little rounded as in its ``body.h``.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def project_to_boxes(
     boxes, in_front = _core.project_to_boxes(model, camera, poses, solids.ellipsoids)
     rows = np.flatnonzero(solids.is_body)
     boxes[rows], in_front[rows], _ = _project_bodies(model, camera, poses[rows], solids.take(rows))
-    return boxes, in_front
+    return boxes, np.asarray(in_front)
 
 
 def box_chi_squares(

@@ -1,8 +1,8 @@
 """Solids as plain data.
 
 A solid is ``{c + A u}``, with the center c and A = R diag(half-lengths), whose columns are its
-half-axes in the world. u is in the unit ball for an ellipsoid, in the unit cube for a cuboid, and in
-the unit cylinder, whose axis is the third, for a cylinder. Edges are sharp; only predicted boxes
+half-axes in the world. u is in the unit ball for an ellipsoid, in the unit cube for a cuboid, and
+in the unit cylinder, whose axis is the third, for a cylinder. Edges are sharp; only predicted boxes
 have those of the estimator, which are a little rounded.
 """
 
@@ -10,13 +10,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dqslam import _core
-from dqslam._checks import Bools, Floats, Ints
+from dqslam._checks import Bools, Floats
 from dqslam._core import Shape
 
+Rows = NDArray[np.signedinteger[Any]]
 #: Volume over the product of the half-lengths.
 _VOLUME = {
     Shape.ELLIPSOID: 4.0 / 3.0 * np.pi,
@@ -95,7 +98,7 @@ class Solids:
         known = np.where(self.has_surface[:, None, None], self.factors, 0.0)
         return np.where(self.has_surface, shares * np.abs(np.linalg.det(known)), np.nan)
 
-    def take(self, rows: Ints | Bools | Sequence[int]) -> Solids:
+    def take(self, rows: Rows | Bools | Sequence[int]) -> Solids:
         """Return the solids of some rows, which may repeat, or of flags (o,)."""
         numbers = np.arange(len(self))[np.asarray(rows) if len(rows) else slice(0)]
         return Solids(
@@ -140,9 +143,7 @@ class Solids:
             inside = signed
         elif self.shapes[row] == Shape.CYLINDER:
             radius, angle = np.sqrt(uniform[:, 2]), 2.0 * np.pi * uniform[:, 1]
-            inside = np.column_stack(
-                [radius * np.cos(angle), radius * np.sin(angle), signed[:, 0]]
-            )
+            inside = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), signed[:, 0]])
         else:
             z, angle = signed[:, 0], 2.0 * np.pi * uniform[:, 1]
             across = np.sqrt(1.0 - z**2)

@@ -103,7 +103,9 @@ class MapObjects:
         """Whether each object is a cuboid or a cylinder, shape (o,)."""
         if not self.object_shapes:
             return np.zeros(len(self), dtype=np.bool_)
-        return np.array([one != _core.Shape.ELLIPSOID for one in self.object_shapes], dtype=np.bool_)
+        return np.array(
+            [one != _core.Shape.ELLIPSOID for one in self.object_shapes], dtype=np.bool_
+        )
 
     @property
     def solids(self) -> Solids:

@@ -150,4 +150,3 @@ def _object(estimate: Estimate, row: int, marginals: Covariances | None) -> dict
     if estimate.is_body[row]:
         described["log_half_lengths_sigma"] = np.sqrt(np.diagonal(covariance)[3:6])
     return described
-
