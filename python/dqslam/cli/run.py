@@ -130,8 +130,8 @@ def run(
         str,
         typer.Option(
             metavar="SHAPES",
-            help="Shape of objects: ellipsoid, cuboid, cylinder, auto, which is what boxes that took "
-            "no part show, or a TOML file with the shape of each class.",
+            help="Shape of objects: ellipsoid, cuboid, cylinder, auto, which is what boxes that "
+            "took no part show, or a TOML file with the shape of each class.",
         ),
     ] = "ellipsoid",
     hold_out: Annotated[

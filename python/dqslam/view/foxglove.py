@@ -1,9 +1,10 @@
 """A scene as MCAP with the schemas of Foxglove, as a file or live over a websocket.
 
 Topics: ``/map`` has an ellipsoid, a cuboid or a cylinder for each object, ``/truth`` a cuboid for
-each true object of known size, ``/paths`` the paths. For each pose, at its time, ``/tf`` has camera in world, ``/pose`` the
-same as a pose, ``/boxes`` the boxes of the image and ``/outlines`` the outlines of the objects in
-it, in undistorted pixels. ``/calibration`` is the pinhole of these pixels.
+each true object of known size, ``/paths`` the paths. For each pose, at its time, ``/tf`` has camera
+in world, ``/pose`` the same as a pose, ``/boxes`` the boxes of the image and ``/outlines`` the
+outlines of the objects in it, in undistorted pixels. ``/calibration`` is the pinhole of these
+pixels.
 """
 
 from __future__ import annotations

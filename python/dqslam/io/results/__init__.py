@@ -5,8 +5,8 @@
 ``odometry.txt``    TUM: the initial poses, at the same times.
 ``camera.json``     ``fx fy cx cy width height k1 k2 p1 p2 k3``, as ``io.read_camera`` reads it.
 ``map.json``        ``objects``: ``id class_name shape center semi_axes orientation_xyzw
-                    dual_quadric observations``, ``half_lengths rotation_vector`` of a cuboid or a cylinder,
-                    ``doubt`` where its size is not to be believed, and with
+                    dual_quadric observations``, ``half_lengths rotation_vector`` of a
+                    cuboid or a cylinder, ``doubt`` where its size is not to be believed, and with
                     marginals ``center_covariance`` [m^2], ``log_semi_axes_sigma`` and
                     ``log_half_lengths_sigma``;
                     ``dropped``: ``id reason``.
