@@ -76,13 +76,13 @@ def choose_shapes(
     gains = np.full(len(shapes), np.nan)
     if tested.size:
         gains[tested] = _gains(core, state, shapes, tested, solver)
-    # Own boxes tell a cuboid from a cylinder less well than boxes that took no part.
+    # Boxes that took no part tell a cuboid from a cylinder better, where they are sure.
     free = tested[~is_told[tested]]
     if free.size:
         others = [_OTHER.get(shape, shape) for shape in shapes]
         of_others = _gains(core, state, others, free, solver)
         for row, gain in zip(free.tolist(), of_others.tolist(), strict=True):
-            if gain > gains[row]:
+            if gain > gains[row] + LEAST_GAIN:
                 shapes[row], gains[row] = others[row], gain
     reasons: tuple[dict[int, str], dict[int, str]] = ({}, {})
     of_class: dict[tuple[str, Shape], list[float]] = defaultdict(list)
