@@ -73,7 +73,8 @@ def box_chi_squares(
     predicted, in_front, touching = _project_bodies(model, camera, poses[rows], solids.take(rows))
     last = np.array([camera.width, camera.height]) - 0.5
     is_seen = ((touching >= -0.5) & (touching <= last)).all(axis=2)
-    one_sided = truncated[rows] | (truncated[rows].any(axis=1)[:, None] & ~is_seen)
+    is_cut = np.any(truncated[rows], axis=1, keepdims=True)
+    one_sided = truncated[rows] | (is_cut & ~is_seen)
     error = predicted - boxes[rows]
     error = np.where(one_sided & (error * _OUTWARD > 0.0), 0.0, error)
     whitened = np.linalg.solve(covariances[rows].reshape(-1, 4, 4), error[:, :, None])
