@@ -48,12 +48,14 @@ if TYPE_CHECKING:  # the one list of public names, a line each: lazy_exports rea
     from dqslam.association import associate as associate
     from dqslam.assumptions import UNKNOWN_SIZE as UNKNOWN_SIZE
     from dqslam.assumptions import BoxNoise as BoxNoise
+    from dqslam.assumptions import ClassShapes as ClassShapes
     from dqslam.assumptions import OdometryNoise as OdometryNoise
     from dqslam.assumptions import PlacementRule as PlacementRule
     from dqslam.assumptions import PlacementRules as PlacementRules
     from dqslam.assumptions import SizePrior as SizePrior
     from dqslam.assumptions import SizePriors as SizePriors
     from dqslam.assumptions import load_placements as load_placements
+    from dqslam.assumptions import load_shapes as load_shapes
     from dqslam.assumptions import load_size_priors as load_size_priors
     from dqslam.calibration import CalibrationFinding as CalibrationFinding
     from dqslam.calibration import calibrated_covariances as calibrated_covariances

@@ -6,8 +6,16 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from dqslam._checks import Bools, Floats, Ints
-from dqslam._core import Camera, PoseModel, Shape, axes_from_ellipsoid, dual_quadric_shapes
+from dqslam._core import (
+    Camera,
+    PoseModel,
+    Shape,
+    axes_from_ellipsoid,
+    dual_quadric_shapes,
+    log_semi_axes_jacobian,
+)
 from dqslam._repr import counted
+from dqslam.solids import MOMENTS, Solids, body_solids
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,17 +122,35 @@ class Estimate:
         The third of a cylinder is along its axis.
         """
         half_lengths = np.full((len(self.object_ids), 3), np.nan)
-        half_lengths[self.is_body] = np.exp(self.landmarks[self.is_body, 3:6])
+        if self.object_shapes:
+            half_lengths[self.is_body] = np.exp(self.landmarks[self.is_body, 3:6])
         return half_lengths
 
     @property
     def volumes(self) -> Floats:
         """Volume [m^3] of each object in its own shape, (o,); NaN for no real surface."""
-        volumes = 4.0 / 3.0 * np.pi * self.semi_axes.prod(axis=1)
-        for row in np.flatnonzero(self.is_body):
-            is_cuboid = self.object_shapes[row] == Shape.CUBOID
-            volumes[row] = (8.0 if is_cuboid else 2.0 * np.pi) * self.half_lengths[row].prod()
-        return np.asarray(volumes)
+        return self.solids.volumes
+
+    @property
+    def solids(self) -> Solids:
+        """The surfaces of the objects, to draw, project and compare."""
+        turns = self.landmarks[:, 6:9] if self.object_shapes else np.zeros((0, 3))
+        return body_solids(
+            self.object_shapes, self.ellipsoids, self.centers, self.half_lengths, turns
+        )
+
+    def log_semi_axes_variances(self, row: int, covariance: Floats) -> Floats:
+        """Return the variances of the logarithms of an object's semi-axes, descending, (3,).
+
+        ``covariance`` (9, 9) is that of its ellipsoid, or of its landmark if it is a cuboid or a
+        cylinder.
+        """
+        if not self.is_body[row]:
+            jacobian = log_semi_axes_jacobian(self.ellipsoids[row])
+            return np.diagonal(jacobian @ covariance @ jacobian.T)
+        # Each semi-axis of the ellipsoid with the same moments is a fixed share of a half-length.
+        order = np.argsort(-MOMENTS[self.object_shapes[row]] * self.half_lengths[row])
+        return np.diagonal(covariance)[3:6][order]
 
     @property
     def is_ellipsoid(self) -> Bools:

@@ -8,7 +8,7 @@ import numpy as np
 from dqslam import _core
 from dqslam._checks import Bools, Floats, Ints, as_floats, require
 from dqslam._repr import counted
-from dqslam.assumptions import BoxNoise, SizePrior, SizePriors
+from dqslam.assumptions import BoxNoise, ClassShapes, SizePrior, SizePriors
 from dqslam.coincidence import contradicted_objects
 from dqslam.estimate import Estimate
 from dqslam.layout import (
@@ -71,7 +71,7 @@ def build_graph(
     box_noise: BoxNoise | None = None,
     size_prior: SizePrior | SizePriors | None = None,
     scene_priors: _core.ScenePriors | None = None,
-    shapes: _core.Shape | Mapping[str, _core.Shape] | None = None,
+    shapes: _core.Shape | ClassShapes | Mapping[str, _core.Shape] | None = None,
 ) -> Graph:
     """Make the least-squares problem of a recording, with initial poses from dead reckoning.
 
@@ -86,7 +86,8 @@ def build_graph(
     shapes
         The shape of all objects, or of each class by name: ``Shape.CUBOID``, ``CYLINDER``,
         ``ELLIPSOID``, or ``AUTO``, the one that explains an object's boxes best. By default, and
-        for classes that are not named, objects are ellipsoids.
+        for classes that are not named, objects are ellipsoids. ``ClassShapes`` has a shape for
+        those, too.
 
     Raises
     ------

@@ -8,7 +8,7 @@ import numpy as np
 
 from dqslam import _core
 from dqslam._checks import Floats, Ints, reject_rows
-from dqslam.assumptions import UNKNOWN_SIZE, SizePrior, SizePriors
+from dqslam.assumptions import UNKNOWN_SIZE, ClassShapes, SizePrior, SizePriors
 from dqslam.recording import Detections, LoopClosures, Measurements, Odometry, Recording
 
 
@@ -39,7 +39,7 @@ def size_prior_table(priors: list[SizePrior], medians: list[SizePrior]) -> _core
 
 
 def shapes_of(
-    given: _core.Shape | Mapping[str, _core.Shape] | None,
+    given: _core.Shape | ClassShapes | Mapping[str, _core.Shape] | None,
     class_names: tuple[str, ...],
     detections: Detections,
 ) -> list[_core.Shape]:
@@ -48,11 +48,14 @@ def shapes_of(
         return []
     if isinstance(given, _core.Shape):
         return [given] * len(class_names)
-    for name in given:
+    if not isinstance(given, ClassShapes):
+        given = ClassShapes(given)
+    classes, default = given.classes, given.default
+    for name in classes:
         if name not in detections.class_names.values():
             names = ", ".join(sorted(set(detections.class_names.values())))
             raise ValueError(f"shapes: no class {name!r} in the recording, only: {names}")
-    return [given.get(name, _core.Shape.ELLIPSOID) for name in class_names]
+    return [classes.get(name, default) for name in class_names]
 
 
 def odometry_table(odometry: Odometry, closures: LoopClosures | None) -> _core.OdometryTable:

@@ -4,7 +4,7 @@ from scipy.spatial.transform import Rotation
 
 import planted
 from dqslam.io import FileError, load_results, write_ply
-from dqslam.io.ply import unit_sphere
+from dqslam.solids import unit_sphere
 
 COLORS = [(10 * k, 20, 30) for k in range(5)]
 PATH_COLOR = (213, 94, 0)

@@ -70,7 +70,7 @@ def test_map(tmp_path):
     assert list(content) == ["objects", "dropped"]
     assert content["dropped"] == [{"id": 4, "reason": "too few"}]
     cup, tv = content["objects"]
-    keys = "id class_name center semi_axes orientation_xyzw dual_quadric observations"
+    keys = "id class_name shape center semi_axes orientation_xyzw dual_quadric observations"
     assert list(cup) == list(tv) == keys.split()
     assert (cup["id"], cup["class_name"], cup["observations"]) == (3, "cup", 12)
     np.testing.assert_allclose(cup["center"], CENTER, rtol=1e-12)

@@ -5,6 +5,7 @@ from scipy.spatial.transform import Rotation
 import orbit
 from dqslam import Camera, _core
 from dqslam.metrics import box_iou, ellipsoid_iou, match_boxes, reprojection_iou
+from dqslam.solids import Solids
 
 
 def test_boxes_by_hand():
@@ -88,7 +89,7 @@ def test_projections_of_the_truth_are_its_boxes():
     surface = center + 0.07 * orbit.sphere(200)
     box = orbit.bounding_box((surface - poses[0, :3]) @ turn)[None]
     whole = np.zeros((1, 4), dtype=bool)
-    one = ball(center, 0.07)[None]
+    one = Solids.of_ellipsoids(ball(center, 0.07)[None])
     assert reprojection_iou(CAMERA, poses, one, box, whole)[0] == pytest.approx(1.0, abs=1e-3)
     half = box.copy()
     half[0, 2] = half[0, [0, 2]].mean()
@@ -104,5 +105,5 @@ def test_projections_of_the_truth_are_its_boxes():
 def test_what_is_behind_or_no_ellipsoid_overlaps_nothing():
     poses = np.tile([0.0, 0, 0, 0, 0, 0, 1], (2, 1))
     boxes, whole = np.tile([0.0, 0, 100, 100], (2, 1)), np.zeros((2, 4), dtype=bool)
-    ellipsoids = np.array([ball([0, 0, -5], 1), np.full(9, np.nan)])
-    np.testing.assert_array_equal(reprojection_iou(CAMERA, poses, ellipsoids, boxes, whole), 0.0)
+    solids = Solids.of_ellipsoids(np.array([ball([0, 0, -5], 1), np.full(9, np.nan)]))
+    np.testing.assert_array_equal(reprojection_iou(CAMERA, poses, solids, boxes, whole), 0.0)

@@ -6,6 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from dqslam import _core
 from dqslam.metrics import through_lens, visible_outlines
+from dqslam.solids import Solids
 from oracle import ellipsoid_surface, se3_matrix, to_pixels
 
 CAMERA = _core.Camera(500.0, 510.0, 321.0, 239.0, 640, 480)
@@ -80,12 +81,13 @@ def test_what_is_behind_or_around_the_camera_has_no_outline(depth):
 def test_what_the_image_shows_comes_from_far_to_near():
     places = [[0, 0, 4], [0, 0, -4], [0.5, 0, 9], [9, 0, 4], [-1, 0, 6]]
     ellipsoids = [_core.ellipsoid_from_axes(place, [0.3] * 3, [0, 0, 0, 1]) for place in places]
-    rows, outlines = visible_outlines(CAMERA, np.eye(7)[6], np.array([*ellipsoids, [np.nan] * 9]))
+    solids = Solids.of_ellipsoids(np.array([*ellipsoids, [np.nan] * 9]))
+    rows, outlines = visible_outlines(CAMERA, np.eye(7)[6], solids)
     np.testing.assert_array_equal(rows, [2, 4, 0])
     here = np.tile(np.eye(7)[6], (3, 1))
     expected = project_outlines(CAMERA, here, np.array(ellipsoids)[rows])
     np.testing.assert_array_equal(outlines, expected)
-    rows, outlines = visible_outlines(CAMERA, np.eye(7)[6], np.zeros((0, 9)), points=7)
+    rows, outlines = visible_outlines(CAMERA, np.eye(7)[6], solids.take([]), points=7)
     assert (rows.shape, outlines.shape) == ((0,), (0, 7, 2))
 
 

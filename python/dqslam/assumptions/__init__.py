@@ -8,6 +8,8 @@ from dqslam.assumptions.placements import PlacementRule as PlacementRule
 from dqslam.assumptions.placements import PlacementRules as PlacementRules
 from dqslam.assumptions.placements import check_placement_classes as check_placement_classes
 from dqslam.assumptions.placements import load_placements as load_placements
+from dqslam.assumptions.shapes import ClassShapes as ClassShapes
+from dqslam.assumptions.shapes import load_shapes as load_shapes
 from dqslam.assumptions.sizes import UNKNOWN_SIZE as UNKNOWN_SIZE
 from dqslam.assumptions.sizes import SizePrior as SizePrior
 from dqslam.assumptions.sizes import SizePriors as SizePriors

@@ -20,7 +20,8 @@ from dqslam.cli.run_tables import show_report
 from dqslam.cli.settings import CONFIG, ConfigFile, settings_text
 
 if TYPE_CHECKING:
-    from dqslam.assumptions import OdometryNoise
+    from dqslam._core import Shape
+    from dqslam.assumptions import ClassShapes, OdometryNoise
 
 DOUBTFUL = 3  # exit code of a run whose result is doubtful
 NOISE = "translation=0.02, rotation=0.01"
@@ -125,6 +126,14 @@ def run(
             help="TOML table of sizes by class. Default: one size for all, from the recording."
         ),
     ] = None,
+    shapes: Annotated[
+        str,
+        typer.Option(
+            metavar="SHAPES",
+            help="Shape of objects: ellipsoid, cuboid, cylinder, auto, which is what boxes that "
+            "took no part show, or a TOML file with the shape of each class.",
+        ),
+    ] = "ellipsoid",
     hold_out: Annotated[
         float,
         typer.Option(
@@ -178,6 +187,7 @@ def run(
         trust_ids=trust_ids,
         mode=_core.Mode[mode.upper()],
         size_prior=None if size_priors is None else load_size_priors(size_priors),
+        shapes=parse_shapes(shapes),
         estimate=split_names(estimate),
         hold_out=hold_out,
         seed=seed,
@@ -221,6 +231,19 @@ def run(
         output.line(f"wrote {mcap}")
     if result.report["doubts"]:
         raise typer.Exit(DOUBTFUL)
+
+
+def parse_shapes(given: str) -> "Shape | ClassShapes":
+    """Return the shape of that name, or read a file with the shapes of classes."""
+    from dqslam._core import Shape
+    from dqslam.assumptions import load_shapes
+
+    if given.upper() in Shape.__members__:
+        return Shape[given.upper()]
+    if not Path(given).suffix and not Path(given).exists():
+        names = ", ".join(name.lower() for name in Shape.__members__)
+        raise ValueError(f"--shapes: {given!r} is none of {names}, and no file")
+    return load_shapes(given)
 
 
 def split_names(text: str | None) -> tuple[str, ...]:

@@ -27,6 +27,17 @@ def show_report(output: Output, report: dict[str, Any]) -> None:
         output.warn(warning)
 
 
+def _shapes(shapes: dict[str, Any]) -> str:
+    found = list(shapes["shapes"].values())
+    counts = ", ".join(f"{found.count(name)} {name}s" for name in ("cuboid", "cylinder"))
+    if not shapes["rejected"]:
+        return counts
+    return (
+        f"{counts}; {len(shapes['rejected'])} objects might be one, but boxes that took no part do "
+        "not show it"
+    )
+
+
 def _dropped(report: dict[str, Any]) -> list[tuple[str, str]]:
     return sorted(report["dropped_objects"].items(), key=lambda item: int(item[0]))
 
@@ -57,6 +68,8 @@ def _overview(report: dict[str, Any]) -> "Table":
             f"median {boxes['chi2_median']:.2f} (3.36 expected); {boxes['outlier_share']:.1%} do "
             f"not fit (above 13.28), {boxes['not_in_front']} of them not even in front",
         )
+    if report["shapes"] is not None:
+        table.add_row("shapes", _shapes(report["shapes"]))
     table.add_row("re-projection", _reprojection(report["reprojection"]))
     table.add_row("noise of a box edge", _box_noise(report["box_noise"]))
     table.add_row("odometry noise", _noise(report["odometry_noise"]))
@@ -143,11 +156,14 @@ def _objects(objects: list[dict[str, Any]]) -> "Table":
     from rich.table import Table
 
     table = Table(box=SIMPLE_HEAD)
-    headings = ("id", "class", "boxes", "center [m]", "± [m]", "size [m]", "chi-square", "outliers")
+    headings = ["id", "class", "boxes", "center [m]", "± [m]", "size [m]", "chi-square", "outliers"]
+    has_shapes = any(entry["shape"] not in (None, "ellipsoid") for entry in objects)
+    if has_shapes:
+        headings.insert(6, "shape")
     for heading in headings:
-        table.add_column(heading, justify="left" if heading == "class" else "right")
+        table.add_column(heading, justify="left" if heading in ("class", "shape") else "right")
     for entry in objects:
-        sigma, axes = entry["center_sigma_m"], entry["semi_axes_m"]
+        sigma, axes = entry["center_sigma_m"], entry["half_lengths_m"] or entry["semi_axes_m"]
         table.add_row(
             str(entry["id"]) if entry["doubt"] is None else f"{entry['id']} ?",
             escape(entry["class_name"]),
@@ -155,6 +171,7 @@ def _objects(objects: list[dict[str, Any]]) -> "Table":
             " ".join(f"{value:.3g}" for value in entry["center_m"]),
             "unknown" if sigma is None else f"{sigma:.2g}",
             "unknown" if None in axes else " x ".join(f"{2.0 * axis:.2g}" for axis in axes),
+            *([entry["shape"] or "none"] if has_shapes else []),
             "none" if entry["chi2_median"] is None else f"{entry['chi2_median']:.2f}",
             "none" if entry["outlier_share"] is None else f"{entry['outlier_share']:.0%}",
         )

@@ -41,7 +41,7 @@ def box_overlaps(results: Results, boxes: BoxTable) -> Floats:
     overlap[mapped] = reprojection_iou(
         results.camera,
         results.poses[boxes.pose[mapped]],
-        objects.ellipsoids[row[mapped]],
+        objects.solids.take(row[mapped]),
         boxes.box[mapped],
         boxes.truncated[mapped],
     )

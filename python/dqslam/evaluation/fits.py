@@ -11,6 +11,7 @@ from dqslam._checks import Bools, Floats, Ints
 from dqslam.assumptions import BoxNoise
 from dqslam.evaluation.boxes import box_overlaps
 from dqslam.io import BoxTable, FileError, Results
+from dqslam.solids import project_to_boxes
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,11 +70,11 @@ def fit_boxes(results: Results) -> BoxFits:
     row = np.array([row_of.get(int(number), -1) for number in boxes.object_id], dtype=np.int64)
     mapped = np.flatnonzero(row >= 0)
     predicted = np.full((len(boxes), 4), np.nan)
-    predicted[mapped], _ = _core.project_to_boxes(
+    predicted[mapped], _ = project_to_boxes(
         _core.PoseModel.SE3,
         results.camera,
         results.poses[boxes.pose[mapped]],
-        objects.ellipsoids[row[mapped]],
+        objects.solids.take(row[mapped]),
     )
     noise = _noise(results)
     variance = np.diagonal(noise.covariance(boxes.box, results.camera), axis1=1, axis2=2)

@@ -12,12 +12,13 @@ from dqslam.io import MapObjects, TrueObjects
 from dqslam.metrics import (
     Alignment,
     Matches,
-    ellipsoid_iou,
     match_by_id,
     match_nearest,
     orientation_error,
     size_error,
+    solid_iou,
 )
+from dqslam.solids import Solids
 
 Match = Literal["nearest", "id"]
 # The largest distance of a match if sizes are unknown, meters.
@@ -34,8 +35,9 @@ def evaluate_objects(
 ) -> dict[str, Any]:
     """Match the objects of a map with the true ones, and compare each pair.
 
-    A true object stands for the ellipsoid that is inscribed in its box, with semi-axes of half its
-    sizes. Values that the truth does not have, or that no pair has, are None.
+    A true object stands for the solid of the same shape as the estimated one that is inscribed in
+    its box, with half-lengths of half its sizes. Values that the truth does not have, or that no
+    pair has, are None.
 
     Parameters
     ----------
@@ -129,35 +131,38 @@ def _compare_shapes(
     objects: MapObjects, row: int, truth: TrueObjects, true_row: int, alignment: Alignment
 ) -> dict[str, float | None]:
     """Compare size, orientation and overlap of one object with the truth, as far as known."""
-    from scipy.spatial.transform import Rotation
-
     names = ("size_relative", "volume_ratio", "orientation_deg", "iou_3d")
     unknown: dict[str, float | None] = dict.fromkeys(names)
     if truth.size is None or not objects.is_ellipsoid[row]:
         return unknown
-    semi_axes = alignment.scale * objects.semi_axes[row]
-    true_semi_axes = 0.5 * truth.size[true_row]
+    solid = objects.solids.take([row]).moved(
+        alignment.rotation, alignment.translation, alignment.scale
+    )
+    half_lengths = np.linalg.norm(solid.factors[0], axis=0)
+    true_half_lengths = 0.5 * truth.size[true_row]
     sizes = unknown | {
-        "size_relative": size_error(semi_axes, true_semi_axes),
-        "volume_ratio": float(np.prod(semi_axes) / np.prod(true_semi_axes)),
+        "size_relative": size_error(half_lengths, true_half_lengths),
+        "volume_ratio": float(np.prod(half_lengths) / np.prod(true_half_lengths)),
     }
     if truth.rotation is None:
         return sizes
-    world_from_object = Rotation.from_matrix(alignment.rotation) * Rotation.from_quat(
-        objects.orientations[row]
-    )
     true_rotation = truth.rotation[true_row]
     angle = orientation_error(
-        world_from_object.as_matrix(), semi_axes, true_rotation, true_semi_axes
+        solid.factors[0] / half_lengths, half_lengths, true_rotation, true_half_lengths
     )
-    (center,) = alignment.apply(objects.centers[[row]])
-    ellipsoid = _core.ellipsoid_from_axes(center, semi_axes, world_from_object.as_quat())
-    true_ellipsoid = _core.ellipsoid_from_axes(
-        truth.center[true_row], true_semi_axes, Rotation.from_matrix(true_rotation).as_quat()
+    order = np.arange(3)
+    if solid.shapes[0] == _core.Shape.CYLINDER:  # its axis, the third, is that nearest to it
+        along = np.argmax(np.abs(true_rotation.T @ solid.factors[0, :, 2]))
+        order = np.roll(order, 2 - along)
+    inscribed = Solids.of_axes(
+        solid.shapes,
+        truth.center[[true_row]],
+        true_half_lengths[None, order],
+        true_rotation[None][:, :, order],
     )
     return sizes | {
         "orientation_deg": None if np.isnan(angle) else angle,
-        "iou_3d": ellipsoid_iou(ellipsoid, true_ellipsoid),
+        "iou_3d": solid_iou(solid, inscribed),
     }
 
 

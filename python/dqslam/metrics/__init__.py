@@ -11,12 +11,14 @@ from dqslam.metrics.iou import box_iou as box_iou
 from dqslam.metrics.iou import ellipsoid_iou as ellipsoid_iou
 from dqslam.metrics.iou import match_boxes as match_boxes
 from dqslam.metrics.iou import reprojection_iou as reprojection_iou
+from dqslam.metrics.iou import solid_iou as solid_iou
 from dqslam.metrics.objects import Matches as Matches
 from dqslam.metrics.objects import center_errors as center_errors
 from dqslam.metrics.objects import match_by_id as match_by_id
 from dqslam.metrics.objects import match_nearest as match_nearest
 from dqslam.metrics.objects import orientation_error as orientation_error
 from dqslam.metrics.objects import size_error as size_error
+from dqslam.metrics.outline import projected_edges as projected_edges
 from dqslam.metrics.outline import through_lens as through_lens
 from dqslam.metrics.outline import visible_outlines as visible_outlines
 from dqslam.metrics.simulation import Report as Report

@@ -1,9 +1,10 @@
-"""Intersection over union of boxes in the image, and of ellipsoids in space."""
+"""Intersection over union of boxes in the image, and of solids in space."""
 
 import numpy as np
 
 from dqslam import _core
 from dqslam._checks import Bools, Floats, Ints
+from dqslam.solids import Solids, project_to_boxes
 
 
 def box_iou(boxes: Floats, others: Floats) -> Floats:
@@ -40,20 +41,18 @@ def match_boxes(
 def reprojection_iou(
     camera: _core.Camera,
     world_from_camera: Floats,
-    ellipsoids: Floats,
+    solids: Solids,
     boxes: Floats,
     truncated: Bools,
 ) -> Floats:
-    """Return the IoU of each box with the projection of its ellipsoid, shape (m,).
+    """Return the IoU of each box with the projection of its solid, shape (m,).
 
-    All arguments are row by row: poses (m, 7), ellipsoids (m, 9) or NaN, boxes (m, 4) and flags of
+    All arguments are row by row: poses (m, 7), m solids, boxes (m, 4) and flags of
     their truncated edges (m, 4). The camera must have no mount. Regions beyond a truncated edge are
-    not compared, because they are outside the image. The IoU is 0 where the ellipsoid is not
+    not compared, because they are outside the image. The IoU is 0 where the solid is not
     strictly in front of the camera.
     """
-    predicted, visible = _core.project_to_boxes(
-        _core.PoseModel.SE3, camera, world_from_camera, ellipsoids
-    )
+    predicted, visible = project_to_boxes(_core.PoseModel.SE3, camera, world_from_camera, solids)
     predicted = np.where(visible[:, None], predicted, boxes)
     low, high = predicted[:, :2], predicted[:, 2:]
     low = np.where(truncated[:, :2], np.maximum(low, boxes[:, :2]), low)
@@ -63,36 +62,22 @@ def reprojection_iou(
 
 
 def ellipsoid_iou(ellipsoid: Floats, other: Floats, *, samples: int = 4096, seed: int = 0) -> float:
-    """Return the IoU of two ellipsoids, each center and log-Cholesky shape (9,), by sampling.
+    """Return the IoU of two ellipsoids, each center and log-Cholesky shape (9,); `solid_iou`."""
+    one, two = (Solids.of_ellipsoids(each[None]) for each in (ellipsoid, other))
+    return solid_iou(one, two, samples=samples, seed=seed)
+
+
+def solid_iou(solid: Solids, other: Solids, *, samples: int = 4096, seed: int = 0) -> float:
+    """Return the IoU of two solids, each the only one given, by sampling.
 
     The smaller one is filled with a scrambled Sobol sequence of ``samples`` points, a power of 2.
     With 4096 the error is about 0.002.
     """
-    (center, lower), (other_center, other_lower) = (
-        _center_and_factor(ellipsoid),
-        _center_and_factor(other),
-    )
-    volume, other_volume = (float(np.prod(np.diag(factor))) for factor in (lower, other_lower))
-    if volume > other_volume:
-        return ellipsoid_iou(other, ellipsoid, samples=samples, seed=seed)
-    points = _unit_ball(samples, seed) @ lower.T + center
-    inside = np.linalg.norm(np.linalg.solve(other_lower, (points - other_center).T), axis=0) <= 1.0
-    both = volume * float(inside.mean())
-    return both / (volume + other_volume - both)
-
-
-def _center_and_factor(ellipsoid: Floats) -> tuple[Floats, Floats]:
-    """Return center (3,) and L (3, 3), which turns the unit ball into the ellipsoid."""
-    (shape,) = _core.ellipsoid_shapes(ellipsoid[None])
-    return ellipsoid[:3], np.asarray(np.linalg.cholesky(shape))
-
-
-def _unit_ball(samples: int, seed: int) -> Floats:
-    """Return points that fill the unit ball evenly, shape (samples, 3)."""
     from scipy.stats import qmc
 
-    u, v, w = qmc.Sobol(3, seed=seed).random(samples).T
-    z, angle = 2.0 * u - 1.0, 2.0 * np.pi * v
-    across = np.sqrt(1.0 - z**2)
-    on_sphere = np.column_stack([across * np.cos(angle), across * np.sin(angle), z])
-    return np.asarray(on_sphere * np.cbrt(w)[:, None])
+    (volume,), (other_volume,) = solid.volumes, other.volumes
+    if volume > other_volume:
+        return solid_iou(other, solid, samples=samples, seed=seed)
+    points = solid.filled(0, qmc.Sobol(3, seed=seed).random(samples))
+    both = volume * float(other.contains(0, points).mean())
+    return float(both / (volume + other_volume - both))

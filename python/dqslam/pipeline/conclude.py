@@ -35,6 +35,7 @@ from dqslam.pipeline.report import (
     warn_of_doubtful,
     warn_of_evidence,
 )
+from dqslam.pipeline.shape_choice import warn_of_shapes
 from dqslam.recording import Detections
 from dqslam.uncertainty import Marginals
 
@@ -63,6 +64,8 @@ class EstimatorOutput:
     """Of the boxes of each mapped object, where it was estimated."""
     repeated: RepeatedNoise | None = None
     """What of the boxes' noise repeats from image to image, where that was estimated."""
+    shapes: dict[str, Any] | None = None
+    """Which objects are cuboids or cylinders, and why others are not, where that was asked."""
     evidence: dict[str, Any] | None = None
     """What boxes that took no part say for the estimate, against the odometry."""
     noise_levels: dict[str, float] = field(default_factory=dict)
@@ -145,6 +148,7 @@ def conclude(
             *warn_of_evidence(output.evidence),
             *warn_of_doubtful(estimate),
             *warn_of_contradictions(estimate),
+            *warn_of_shapes(output.shapes),
             *warn_of_bent_poses(output.marginals),
             *warn_of_calibration(output.calibration),
         ],
@@ -158,6 +162,7 @@ def conclude(
             "unassigned": int(np.sum(output.object_id < 0)),
         },
         "objects": describe_objects(estimate, assigned, chi2, output.marginals),
+        "shapes": output.shapes,
         "dropped_objects": {str(name): why for name, why in estimate.dropped.items()},
         "size_prior": describe_size_prior(output.size_prior),
         "reprojection": describe_overlap(overlap) | {"held_out": tests_held_out},

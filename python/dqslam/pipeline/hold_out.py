@@ -11,6 +11,7 @@ from dqslam import _core
 from dqslam.estimate import Estimate
 from dqslam.metrics import box_iou
 from dqslam.recording import Detections
+from dqslam.solids import project_to_boxes
 
 # Boxes that overlap less do not show the object.
 LEAST_OVERLAP = 0.1
@@ -48,12 +49,11 @@ def overlap_with_map(
     names = np.array([boxes.class_names[int(number)] for number in boxes.class_id], dtype=object)
     mapped = np.array(estimate.class_names, dtype=object)
     real = np.flatnonzero(estimate.is_ellipsoid)
+    solids = estimate.solids.take(real)
     for pose in np.unique(boxes.pose):
         rows = np.flatnonzero(boxes.pose == pose)
         here = np.repeat(estimate.poses[pose][None], len(real), axis=0)
-        predicted, in_front = _core.project_to_boxes(
-            estimate.pose_model, estimate.camera, here, estimate.ellipsoids[real]
-        )
+        predicted, in_front = project_to_boxes(estimate.pose_model, estimate.camera, here, solids)
         predicted = _inside(estimate.camera, np.where(in_front[:, None], predicted, -2.0))
         table = box_iou(boxes.box[rows][:, None], predicted[None])
         claimed = boxes.object_id[rows][:, None]

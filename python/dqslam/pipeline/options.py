@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from dqslam import _core
 from dqslam.association import FINAL
-from dqslam.assumptions import BoxNoise, OdometryNoise, SizePrior, SizePriors
+from dqslam.assumptions import BoxNoise, ClassShapes, OdometryNoise, SizePrior, SizePriors
 from dqslam.io import Extras, ReadOptions
 from dqslam.io.recording import Ids
 
@@ -30,6 +30,9 @@ class RunOptions:
     estimates in the end how far they are off, and what of that repeats from view to view."""
     size_prior: SizePrior | SizePriors | None = None
     """How large objects are, all of them or by class; None learns one size from those found."""
+    shapes: _core.Shape | ClassShapes | Mapping[str, _core.Shape] | None = None
+    """Shape of all objects, or by class, as ``build_graph`` takes it. With AUTO, an object is a
+    cuboid or a cylinder where that predicts boxes better that took no part. None is ELLIPSOID."""
     estimates_noise: bool = False
     """Whether the level of the odometry's noise is estimated instead of believed."""
     estimate: tuple[str, ...] = ()

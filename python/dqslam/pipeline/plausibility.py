@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from dqslam import _core
 from dqslam._checks import Floats, Ints
 from dqslam.assumptions import SizePrior, SizePriors
 from dqslam.estimate import Estimate
@@ -95,7 +94,6 @@ def _log_sigmas(estimate: Estimate, marginals: Marginals | None) -> Floats:
         estimate.is_ellipsoid & np.isfinite(marginals.objects).all(axis=(1, 2))
     )
     for row in known.tolist():
-        jacobian = _core.log_semi_axes_jacobian(estimate.ellipsoids[row])
-        variance = np.diagonal(jacobian @ marginals.objects[row] @ jacobian.T)
+        variance = estimate.log_semi_axes_variances(row, marginals.objects[row])
         sigmas[row] = np.sqrt(variance.clip(min=0.0))
     return sigmas

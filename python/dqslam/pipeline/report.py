@@ -15,6 +15,7 @@ from dqslam.assumptions import BoxNoise, SizePrior, SizePriors
 from dqslam.calibration import CalibrationFinding
 from dqslam.estimate import Estimate
 from dqslam.recording import Detections
+from dqslam.solids import box_chi_squares
 from dqslam.uncertainty import Marginals
 
 # A map that fewer boxes show is worth a warning.
@@ -41,11 +42,11 @@ def box_chi2(
     covariance = np.zeros((len(detections), 4, 4))
     for number, one in enumerate(noises):
         covariance[row == number] = one.covariance(detections.box[row == number], estimate.camera)
-    chi2 = _core.box_chi_squares(
+    chi2 = box_chi_squares(
         estimate.pose_model,
         estimate.camera,
         estimate.poses[detections.pose],
-        estimate.ellipsoids[row],
+        estimate.solids.take(row),
         detections.box,
         covariance.reshape(-1, 16),
         detections.truncated,
@@ -150,6 +151,7 @@ def describe_objects(
 ) -> list[dict[str, Any]]:
     """Describe the place of each object, its size and its boxes."""
     centers = np.full((len(estimate.object_ids), 3, 3), np.nan)
+    half_lengths = estimate.half_lengths
     if marginals is not None:
         centers = marginals.centers
     return [
@@ -159,7 +161,9 @@ def describe_objects(
             "observations": int(estimate.observations[row]),
             "ellipsoid": bool(estimate.is_ellipsoid[row]),
             "center_m": estimate.centers[row].tolist(),
+            "shape": _shape(estimate, row),
             "semi_axes_m": _numbers(estimate.semi_axes[row]),
+            "half_lengths_m": _numbers(half_lengths[row]) if estimate.is_body[row] else None,
             "center_sigma_m": _number(np.sqrt(np.trace(centers[row]))),
             "doubt": estimate.doubtful.get(int(object_id)),
             "contradicted": estimate.contradicted.get(int(object_id)),
@@ -167,6 +171,12 @@ def describe_objects(
         }
         for row, object_id in enumerate(estimate.object_ids)
     ]
+
+
+def _shape(estimate: Estimate, row: int) -> str | None:
+    if not estimate.is_ellipsoid[row]:
+        return None
+    return estimate.object_shapes[row].name.lower() if estimate.object_shapes else "ellipsoid"
 
 
 def _number(value: float) -> float | None:

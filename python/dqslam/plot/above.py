@@ -6,6 +6,7 @@ import numpy as np
 
 from dqslam._checks import Floats
 from dqslam.metrics import up_direction
+from dqslam.solids import Solids, flat_outline
 
 CIRCLE = np.stack([f(np.linspace(0.0, 2.0 * np.pi, 73)) for f in (np.cos, np.sin)])
 _NAMES = ("x", "y", "z")
@@ -25,6 +26,19 @@ class FromAbove:
     def points(self, points: Floats) -> Floats:
         """Return the places (n, 2) of points (n, 3) in the figure, meters."""
         return np.asarray(points @ self.axes.T)
+
+    def solid_outlines(self, solids: Solids) -> list[Floats]:
+        """Return the outline (2, n) of each solid, or its center (2, 1) if it has no surface."""
+        found = []
+        for row, has_surface in enumerate(solids.has_surface):
+            factor = solids.factors[row]
+            if not has_surface:
+                found.append(self.points(solids.centers[[row]]).T)
+            elif solids.is_body[row]:
+                found.append(flat_outline(solids, row, self.axes))
+            else:
+                found.append(self.outline(solids.centers[row], factor @ factor.T))
+        return found
 
     def outline(self, center: Floats, shape: Floats) -> Floats:
         """Return the outline (2, n) of an ellipsoid with center (3,) [m], shape (3, 3) [m^2]."""

@@ -8,7 +8,7 @@ import numpy as np
 from dqslam._colors import object_colors
 from dqslam.evaluation import BoxFits
 from dqslam.io import Results
-from dqslam.metrics import visible_outlines
+from dqslam.metrics import projected_edges, visible_outlines
 from dqslam.plot.frame import draw_boxes, rectangle
 from dqslam.plot.labels import place_labels
 from dqslam.plot.style import (
@@ -30,7 +30,7 @@ _TALLEST = 3.0  # largest height of an image, inches
 def draw_worst_and_median(results: Results, fits: BoxFits) -> "Figure":
     """Draw the frame with the least mean overlap of boxes and objects, and the median frame.
 
-    Detected boxes are solid, boxes of the ellipsoids are dashed, and outlines of the ellipsoids are
+    Detected boxes are solid, boxes of the objects are dashed, and outlines of the objects are
     thin. Pixels are undistorted.
     """
     poses, overlaps = fits.frames()
@@ -74,13 +74,15 @@ def _frame(axes: "Axes", width: int, height: int) -> None:
 
 def _draw(axes: "Axes", results: Results, fits: BoxFits, pose: int, colors: Sequence[str]) -> None:
     detected = draw_boxes(axes, results, fits, pose, colors, lens=False, linewidth=1.0)
-    here, ellipsoids = results.poses[pose], results.objects.ellipsoids
-    rows, outlines = visible_outlines(results.camera, here, ellipsoids)
+    here, solids = results.poses[pose], results.objects.solids
+    rows, outlines = visible_outlines(results.camera, here, solids)
     for row, outline in zip(rows, outlines, strict=True):
         if row not in detected:
             continue
         color = colors[row]
         axes.plot(*outline.T, color=color, linewidth=0.5, gid="outline")
+        for edge in projected_edges(results.camera, here, solids, int(row)):
+            axes.plot(*edge.T, color=color, linewidth=0.25, gid="edge")
         box = np.concatenate([outline.min(axis=0), outline.max(axis=0)])
         axes.plot(
             *rectangle(box), color=color, linewidth=0.8, linestyle=(0, (3, 1.5)), gid="re-projected"
@@ -107,7 +109,7 @@ def _draw_legend(figure: "Figure", fits: BoxFits, poses: list[int]) -> None:
     handles = [
         Line2D([], [], color="0.2", linewidth=1.0, label="detected"),
         Line2D([], [], color="0.2", linewidth=0.8, linestyle=(0, (3, 1.5)), label="re-projected"),
-        Line2D([], [], color="0.2", linewidth=0.5, label="ellipsoid"),
+        Line2D([], [], color="0.2", linewidth=0.5, label="object"),
     ]
     if (here & fits.boxes.held_out).any():
         handles.insert(1, Line2D([], [], color="0.2", linestyle=":", label="held out"))

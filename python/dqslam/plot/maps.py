@@ -9,7 +9,7 @@ import numpy as np
 from dqslam import _core
 from dqslam._checks import Floats
 from dqslam.estimate import Estimate
-from dqslam.plot.above import outline
+from dqslam.plot.above import FromAbove, outline
 from dqslam.plot.style import ESTIMATE, ODOMETRY, TRUTH, new_figure, save_figure
 from dqslam.recording import Truth
 
@@ -70,12 +70,12 @@ def _draw_map(axes: "Axes", estimate: Estimate, truth: Truth) -> None:
     axes.plot(*truth.poses[0, :2], "o", color="black", markersize=4, zorder=3)
     for one in _true_outlines(truth):
         axes.fill(*one, color=TRUTH, alpha=0.4, linewidth=0)
-    objects = zip(estimate.centers, estimate.shapes, estimate.is_ellipsoid, strict=True)
-    for center, shape, is_ellipsoid in objects:
-        if is_ellipsoid:
-            axes.plot(*_outline(center, shape), color=ESTIMATE, linewidth=1.2)
+    view = FromAbove(np.eye(3)[:2], ("x [m]", "y [m]"), downward=False)
+    for one in view.solid_outlines(estimate.solids):
+        if one.shape[1] > 1:
+            axes.plot(*one, color=ESTIMATE, linewidth=1.2)
         else:
-            axes.plot(*center[:2], "x", color=ESTIMATE, markersize=5)
+            axes.plot(*one, "x", color=ESTIMATE, markersize=5)
 
 
 def _draw_legend(figure: "Figure", *, crosses: bool) -> None:

@@ -1,4 +1,4 @@
-"""Outlines of the mapped ellipsoids over the images that a camera took."""
+"""Outlines of the mapped objects over the images that a camera took."""
 
 import shutil
 from collections.abc import Callable, Mapping
@@ -12,7 +12,7 @@ from dqslam._colors import object_colors
 from dqslam._files import FileError, whole_file
 from dqslam.evaluation import fit_boxes
 from dqslam.io import Results
-from dqslam.metrics import visible_outlines
+from dqslam.metrics import projected_edges, visible_outlines
 from dqslam.plot.frame import draw_boxes
 from dqslam.plot.labels import place_labels
 from dqslam.plot.style import column_style, new_figure, save_figure, shown_name
@@ -31,15 +31,16 @@ _UNSEEN = (0, (3, 2))
 class Overlay:
     """One image at a time, with the objects of the map.
 
-    Outlines of ellipsoids with a box in the image are thick and have a name on a tab of their
-    color. The others are dashed, because the objects may be occluded. Boxes are thin. Those without
-    an object are white.
+    Outlines of objects with a box in the image are thick and have a name on a tab of their color,
+    and of cuboids and cylinders the edges, too. The others are dashed, because the objects may be
+    occluded. Boxes are thin. Those without an object are white.
     """
 
     def __init__(self, results: Results) -> None:
         self._results = results
         self.timestamps = results.timestamps
         self._fits = None if results.boxes is None else fit_boxes(results)
+        self._solids = results.objects.solids
         self._colors = object_colors(results.objects.class_names)
         camera = results.camera
         self._scale = max(camera.height / 480.0, 0.5)  # lines and names scale with the image
@@ -84,12 +85,14 @@ class Overlay:
                 unmapped="white",
             )
         here = self._results.poses[pose]
-        rows, outlines = visible_outlines(
-            self._results.camera, here, self._results.objects.ellipsoids, lens=True
-        )
+        rows, outlines = visible_outlines(self._results.camera, here, self._solids, lens=True)
         seen = np.isin(rows, detected)
         for row, outline, is_detected in zip(rows, outlines, seen, strict=True):
             self._draw_object(axes, int(row), outline, is_detected=bool(is_detected))
+            edges = projected_edges(camera, here, self._solids, int(row), lens=True)
+            for edge in edges if is_detected else ():
+                line = {"color": self._colors[row], "linewidth": 0.7 * self._scale}
+                axes.plot(*edge.T, **line, gid="edge")
         named = rows[seen].tolist()
         objects = self._results.objects
         place_labels(

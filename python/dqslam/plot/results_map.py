@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dqslam import _core
 from dqslam._checks import Floats
 from dqslam._colors import class_colors, is_colored_by_object, object_colors
 from dqslam.io import MapObjects, Results, TrueObjects
@@ -135,13 +134,7 @@ def _true_path(view: FromAbove, truth: MapTruth) -> Floats:
 
 def _outlines(view: FromAbove, objects: MapObjects, move: Alignment) -> list[Floats]:
     """Return the outline of each object (2, n), or its center (2, 1) if it is no ellipsoid."""
-    centers = move.apply(objects.centers)
-    turn = move.scale * move.rotation
-    shapes = turn @ _core.ellipsoid_shapes(objects.ellipsoids) @ turn.T
-    return [
-        view.outline(center, shape) if is_ellipsoid else view.points(center[None]).T
-        for center, shape, is_ellipsoid in zip(centers, shapes, objects.is_ellipsoid, strict=True)
-    ]
+    return view.solid_outlines(objects.solids.moved(move.rotation, move.translation, move.scale))
 
 
 def _true_outlines(view: FromAbove, objects: TrueObjects | None) -> list[Floats]:

@@ -1,9 +1,10 @@
 """A scene as MCAP with the schemas of Foxglove, as a file or live over a websocket.
 
-Topics: ``/map`` has an ellipsoid for each object, ``/truth`` a cuboid for each true object of known
-size, ``/paths`` the paths. For each pose, at its time, ``/tf`` has camera in world, ``/pose`` the
-same as a pose, ``/boxes`` the boxes of the image and ``/outlines`` the outlines of the objects in
-it, in undistorted pixels. ``/calibration`` is the pinhole of these pixels.
+Topics: ``/map`` has an ellipsoid, a cuboid or a cylinder for each object, ``/truth`` a cuboid for
+each true object of known size, ``/paths`` the paths. For each pose, at its time, ``/tf`` has camera
+in world, ``/pose`` the same as a pose, ``/boxes`` the boxes of the image and ``/outlines`` the
+outlines of the objects in it, in undistorted pixels. ``/calibration`` is the pinhole of these
+pixels.
 """
 
 from __future__ import annotations
@@ -119,7 +120,7 @@ class _Channels:
         from foxglove.messages import SceneUpdate
 
         at, stamp = _times(scene, frame)
-        objects = [_ellipsoid(row, one, stamp) for row, one in enumerate(scene.objects)]
+        objects = [_object(row, one, stamp) for row, one in enumerate(scene.objects)]
         self.map.log(SceneUpdate(entities=objects), log_time=at)
         cuboids = [
             _cuboid(row, one, stamp)
@@ -175,12 +176,29 @@ def _times(scene: Scene, frame: int) -> tuple[int, Any]:
     return at, Timestamp(at // 10**9, at % 10**9)
 
 
-def _ellipsoid(row: int, one: SceneObject, stamp: Any) -> Any:
-    """Return an object as a sphere of three diameters, with its name."""
-    from foxglove.messages import Color, SceneEntity, SpherePrimitive, TextPrimitive
+def _object(row: int, one: SceneObject, stamp: Any) -> Any:
+    """Return an object in its shape, of three full lengths, with its name."""
+    from foxglove.messages import (
+        Color,
+        CubePrimitive,
+        CylinderPrimitive,
+        SceneEntity,
+        SpherePrimitive,
+        TextPrimitive,
+    )
 
-    spheres = []
-    if one.semi_axes is not None and one.orientation_xyzw is not None:
+    spheres, cubes, cylinders = [], [], []
+    if one.body is not None:
+        placed: dict[str, Any] = {
+            "pose": _pose(one.center, one.body.orientation_xyzw),
+            "size": _vector(2.0 * one.body.half_lengths),
+            "color": _color(one.color, 0.7),
+        }
+        if one.body.shape == "cuboid":
+            cubes.append(CubePrimitive(**placed))
+        else:  # along its z, between two circles that are scaled as one is
+            cylinders.append(CylinderPrimitive(**placed, bottom_scale=1.0, top_scale=1.0))
+    elif one.semi_axes is not None and one.orientation_xyzw is not None:
         spheres.append(
             SpherePrimitive(
                 pose=_pose(one.center, one.orientation_xyzw),
@@ -201,6 +219,8 @@ def _ellipsoid(row: int, one: SceneObject, stamp: Any) -> Any:
         frame_id=WORLD,
         id=f"object {row}",
         spheres=spheres,
+        cubes=cubes,
+        cylinders=cylinders,
         texts=[text],
         metadata=_metadata(one),
     )

@@ -64,7 +64,7 @@ class _Page:
             parents["truth"] = self._group("truth")
             self._path("truth/path", scene.truth, TRUTH, 2.0)
             for row, one in enumerate(scene.true_objects):
-                _ellipsoid(server, f"/truth/objects/{row}", one, TRUTH, wireframe=True, opacity=0.5)
+                _solid(server, f"/truth/objects/{row}", one, TRUTH, wireframe=True, opacity=0.5)
         parents["cameras"] = self._cameras()
         parents["objects"] = self._objects()
         parents["names"] = self._names()
@@ -116,7 +116,7 @@ class _Page:
         group = self._group("objects")
         self.nodes = {}
         for row, one in enumerate(self.scene.objects):
-            node = _ellipsoid(self.server, f"/objects/{row}", one, one.color, opacity=0.85)
+            node = _solid(self.server, f"/objects/{row}", one, one.color, opacity=0.85)
             if node is not None:
                 node.on_click(self._on_click(row))
                 self.nodes[row] = node
@@ -142,7 +142,7 @@ class _Page:
         group = self._group("covariance")
         group.visible = False
         for row, one in enumerate(spreads):
-            _ellipsoid(self.server, f"/covariance/{row}", one, "#111111", opacity=0.5)
+            _solid(self.server, f"/covariance/{row}", one, "#111111", opacity=0.5)
         return group
 
     def _controls(self, parents: dict[str, Any]) -> None:
@@ -204,7 +204,7 @@ def place_eye(scene: Scene) -> tuple[Floats, Floats, float]:
     return middle + radius * (1.3 * beside + 0.9 * scene.up), middle, radius
 
 
-def _ellipsoid(
+def _solid(
     server: ViserServer,
     name: str,
     one: SceneObject | Spread,
@@ -213,7 +213,19 @@ def _ellipsoid(
     opacity: float,
     wireframe: bool = False,
 ) -> Any:
-    """Add an object; return None if it is not an ellipsoid."""
+    """Add an object; return None if it has no surface."""
+    if isinstance(one, SceneObject) and one.body is not None:
+        surface = one.body.mesh
+        return server.scene.add_mesh_simple(
+            name,
+            surface.vertices - one.center,
+            surface.triangles,
+            color=rgb(color),
+            wireframe=wireframe,
+            opacity=opacity,
+            flat_shading=True,
+            position=one.center,
+        )
     if one.semi_axes is None or one.orientation_xyzw is None:
         return None
     return server.scene.add_icosphere(

@@ -53,11 +53,16 @@ def object_numbers(results: Results, evaluation: Mapping[str, Any]) -> list[Numb
         covariance = objects.center_covariances[row]
         if np.isfinite(covariance).all():
             shown.append(("σ of center", _lengths(np.sqrt(np.diag(covariance)))))
-        if objects.is_ellipsoid[row]:
-            shown.append(("size", _lengths(2.0 * objects.semi_axes[row])))
-        if np.isfinite(objects.log_semi_axes_sigmas[row]).all():
-            sigma = " × ".join(f"{100.0 * s:.2g} %" for s in objects.log_semi_axes_sigmas[row])
-            shown.append(("σ of size", sigma))
+        if objects.is_body[row]:
+            shown.append(("shape", objects.object_shapes[row].name.lower()))
+            shown.append(("size", _lengths(2.0 * objects.half_lengths[row])))
+            sigmas = objects.log_half_lengths_sigmas[row]
+        else:
+            if objects.is_ellipsoid[row]:
+                shown.append(("size", _lengths(2.0 * objects.semi_axes[row])))
+            sigmas = objects.log_semi_axes_sigmas[row]
+        if np.isfinite(sigmas).all():
+            shown.append(("σ of size", " × ".join(f"{100.0 * s:.2g} %" for s in sigmas)))
         if boxes is not None and overlap is not None:
             mine = boxes.object_id == objects.object_ids[row]
             shown.append(("boxes", f"{mine.sum()}, {(mine & boxes.inlier).sum()} fit"))

@@ -19,6 +19,7 @@ from dqslam._checks import Floats
 from dqslam._colors import ESTIMATE, ODOMETRY, TRUTH
 from dqslam._outputs import output_set
 from dqslam.io.files import write_text
+from dqslam.view.body import Body
 from dqslam.view.scene import Scene, SceneObject, Spread
 
 _STATIC = Path(__file__).with_name("static")
@@ -91,9 +92,18 @@ def _object(one: SceneObject) -> dict[str, Any]:
         "center": _rounded(one.center),
         "semiAxes": None if one.semi_axes is None else _rounded(one.semi_axes),
         "orientation": None if one.orientation_xyzw is None else _rounded(one.orientation_xyzw),
+        "body": None if one.body is None else _body(one.body),
         "spread": None if spread is None else _spread(spread),
         "numbers": one.numbers,
         "chiSquare": None if one.chi_square is None else round(one.chi_square, 3),
+    }
+
+
+def _body(one: Body) -> dict[str, Any]:
+    return {
+        "shape": one.shape,
+        "hull": _rounded(one.hull),
+        "lines": [_rounded(line) for line in one.lines],
     }
 
 

@@ -21,11 +21,7 @@ def outlines_in_image(scene: Scene, frame: int) -> tuple[Ints, Floats]:
 
     These are in front of the camera and overlap the image, ordered from far to near.
     """
-    ellipsoids = np.full((len(scene.objects), 9), np.nan)
-    for row, one in enumerate(scene.objects):
-        if one.ellipsoid is not None:
-            ellipsoids[row] = one.ellipsoid
-    return visible_outlines(scene.camera, scene.estimate[frame], ellipsoids, points=_POINTS)
+    return visible_outlines(scene.camera, scene.estimate[frame], scene.solids, points=_POINTS)
 
 
 def draw_image(scene: Scene, frame: int, selected: int | None = None) -> str:

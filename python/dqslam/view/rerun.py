@@ -91,21 +91,43 @@ def _log_objects(
     *,
     labels: bool = True,
 ) -> None:
-    """Log ellipsoids, and other objects as points."""
+    """Log objects in their shapes, and those without one as points."""
     import rerun
 
-    bodies = [k for k, one in enumerate(objects) if one.semi_axes is not None]
+    named = [f"{one.class_name} {one.id}" for one in objects]
+    plain = [k for k, one in enumerate(objects) if one.body is None and one.semi_axes is not None]
     points = [k for k, one in enumerate(objects) if one.semi_axes is None]
-    if bodies:
+    if plain:
         shown: dict[str, Any] = {
-            "centers": [objects[k].center for k in bodies],
-            "half_sizes": [objects[k].semi_axes for k in bodies],
-            "quaternions": [objects[k].orientation_xyzw for k in bodies],
-            "colors": [rgb(colors[k]) for k in bodies],
+            "centers": [objects[k].center for k in plain],
+            "half_sizes": [objects[k].semi_axes for k in plain],
+            "quaternions": [objects[k].orientation_xyzw for k in plain],
+            "colors": [rgb(colors[k]) for k in plain],
         }
         if labels:
-            shown["labels"] = [f"{objects[k].class_name} {objects[k].id}" for k in bodies]
+            shown["labels"] = [named[k] for k in plain]
         stream.log(f"world/{name}", rerun.Ellipsoids3D(**shown), static=True)
+    for kind in ("cuboid", "cylinder"):
+        rows = [k for k, one in enumerate(objects) if one.body and one.body.shape == kind]
+        if not rows:
+            continue
+        bodies = [one.body for one in objects if one.body and one.body.shape == kind]
+        given: dict[str, Any] = {
+            "centers": [objects[k].center for k in rows],
+            "quaternions": [body.orientation_xyzw for body in bodies],
+            "colors": [rgb(colors[k]) for k in rows],
+        }
+        if labels:
+            given["labels"] = [named[k] for k in rows]
+        sizes = [body.half_lengths for body in bodies]
+        entity = f"world/{name}/{kind}s"
+        if kind == "cuboid":
+            stream.log(entity, rerun.Boxes3D(half_sizes=sizes, **given), static=True)
+        else:  # round, as rerun has no others
+            radii = [float(np.sqrt(size[0] * size[1])) for size in sizes]
+            lengths = [2.0 * float(size[2]) for size in sizes]
+            drawn = rerun.Cylinders3D(lengths=lengths, radii=radii, **given)
+            stream.log(entity, drawn, static=True)
     if points:
         centers = [objects[k].center for k in points]
         dots = rerun.Points3D(centers, colors=[rgb(colors[k]) for k in points])

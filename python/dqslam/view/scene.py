@@ -19,6 +19,8 @@ from dqslam._colors import TRUTH, class_colors, object_colors
 from dqslam.evaluation import common_poses, evaluate_results, fit_boxes
 from dqslam.io import BoxTable, MapObjects, Results, Trajectory, TrueObjects
 from dqslam.metrics import Align, Alignment, up_direction
+from dqslam.solids import Solids
+from dqslam.view.body import Body, body_of
 from dqslam.view.numbers import Numbers, object_numbers, overview, true_object_numbers
 
 # The true path has a gap if its poses are further apart than this multiple of the usual distance.
@@ -54,13 +56,15 @@ class SceneObject:
     center: Floats
     """Meters, shape (3,)."""
     semi_axes: Floats | None
-    """Meters, shape (3,); None if it is no ellipsoid or its size is unknown."""
+    """Of the ellipsoid, meters, shape (3,); None if it is none or its size is unknown."""
     orientation_xyzw: Floats | None
     """world_from_object, shape (4,); None if ``semi_axes`` is None."""
     center_covariance: Floats | None
     """Square meters, shape (3, 3); None if unknown."""
     numbers: Numbers
     """Its properties as text."""
+    body: Body | None = None
+    """What it is if it is a cuboid or a cylinder, for which the ellipsoid only stands."""
     chi_square: float | None = None
     """Median chi-square of its boxes that no border cuts, 3.36 is usual; None without any."""
 
@@ -121,6 +125,8 @@ class Scene:
     """True poses, split at gaps into parts of shape (t, 7)."""
     objects: tuple[SceneObject, ...]
     true_objects: tuple[SceneObject, ...]
+    solids: Solids
+    """The surfaces of the mapped objects."""
     boxes: SceneBoxes
     overview: Numbers
     """The properties of the estimate as text."""
@@ -191,6 +197,7 @@ def build_scene(
         truth=truth,
         objects=_mapped_objects(results, evaluation, colors),
         true_objects=true_objects,
+        solids=results.objects.solids,
         boxes=_boxes(results.boxes, results.objects),
         overview=overview(results, evaluation),
     )
@@ -236,6 +243,7 @@ def _mapped_objects(
     numbers = object_numbers(results, evaluation)
     chi_squares = _chi_squares(results)
     of_object = object_colors(mapped.class_names, colors)
+    solids = mapped.solids
     return tuple(
         SceneObject(
             id=int(mapped.object_ids[row]),
@@ -246,6 +254,7 @@ def _mapped_objects(
             orientation_xyzw=_known(mapped.orientations[row]),
             center_covariance=_known(mapped.center_covariances[row]),
             numbers=numbers[row],
+            body=body_of(solids, row),
             chi_square=chi_squares[row],
         )
         for row in range(len(mapped))

@@ -4,9 +4,11 @@
 ``trajectory.txt``  TUM: estimated poses, world_from_camera.
 ``odometry.txt``    TUM: the initial poses, at the same times.
 ``camera.json``     ``fx fy cx cy width height k1 k2 p1 p2 k3``, as ``io.read_camera`` reads it.
-``map.json``        ``objects``: ``id class_name center semi_axes orientation_xyzw dual_quadric
-                    observations``, ``doubt`` where its size is not to be believed, and with
-                    marginals ``center_covariance`` [m^2] and ``log_semi_axes_sigma``;
+``map.json``        ``objects``: ``id class_name shape center semi_axes orientation_xyzw
+                    dual_quadric observations``, ``half_lengths rotation_vector`` of a
+                    cuboid or a cylinder, ``doubt`` where its size is not to be believed, and with
+                    marginals ``center_covariance`` [m^2], ``log_semi_axes_sigma`` and
+                    ``log_half_lengths_sigma``;
                     ``dropped``: ``id reason``.
 ``covariance.csv``  Covariances of poses, see ``covariances``. Only when marginals are given.
 ``boxes.csv``       A row per box, used or left out, see ``boxes``. Only when boxes are given.

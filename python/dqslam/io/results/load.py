@@ -22,6 +22,7 @@ from dqslam.io.results.boxes import BoxTable, read_boxes
 from dqslam.io.results.covariances import read_covariances
 from dqslam.io.results.save import NO_POSES
 from dqslam.io.trajectory import Trajectory, read_trajectory
+from dqslam.solids import Solids, body_solids
 
 RESULT_FILES = (
     "trajectory.txt",
@@ -57,6 +58,16 @@ class MapObjects:
     """Square meters, shape (o, 3, 3); NaN if unknown."""
     log_semi_axes_sigmas: Floats
     """Sigmas of the natural logarithms of the semi-axes, shape (o, 3); NaN if unknown."""
+    object_shapes: tuple[_core.Shape, ...] = ()
+    """The shape of each object; empty if all are ellipsoids. For a cuboid or a cylinder,
+    `semi_axes`, `orientations` and `dual_quadrics` are of the ellipsoid with the same moments."""
+    half_lengths: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    """Meters, shape (o, 3), the third of a cylinder along its axis; NaN for an ellipsoid. Empty
+    if all are ellipsoids, as are the next two."""
+    rotation_vectors: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    """world_from_object of a cuboid or a cylinder, rad, shape (o, 3)."""
+    log_half_lengths_sigmas: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    """Sigmas of the natural logarithms of the half-lengths, shape (o, 3); NaN if unknown."""
     dropped: Mapping[int, str] = field(default_factory=dict)
     """Reasons why objects are not in the map, by their ids."""
     doubtful: Mapping[int, str] = field(default_factory=dict)
@@ -86,6 +97,31 @@ class MapObjects:
             axes, turn = self.semi_axes[row], self.orientations[row]
             rows[row] = _core.ellipsoid_from_axes(self.centers[row], axes, turn)
         return rows
+
+    @property
+    def is_body(self) -> Bools:
+        """Whether each object is a cuboid or a cylinder, shape (o,)."""
+        if not self.object_shapes:
+            return np.zeros(len(self), dtype=np.bool_)
+        return np.array(
+            [one != _core.Shape.ELLIPSOID for one in self.object_shapes], dtype=np.bool_
+        )
+
+    @property
+    def solids(self) -> Solids:
+        """The surfaces of the objects, to draw, project and compare."""
+        return body_solids(
+            self.object_shapes,
+            self.ellipsoids,
+            self.centers,
+            self.half_lengths,
+            self.rotation_vectors,
+        )
+
+    @property
+    def volumes(self) -> Floats:
+        """Volume [m^3] of each object in its own shape, (o,); NaN for no ellipsoid."""
+        return self.solids.volumes
 
 
 @dataclass(frozen=True, eq=False)
@@ -235,6 +271,10 @@ def read_map(path: str | Path) -> MapObjects:
             observations=as_ints("objects observations", _column(objects, "observations")),
             center_covariances=_maybe(objects, "center_covariance", (3, 3)),
             log_semi_axes_sigmas=_maybe(objects, "log_semi_axes_sigma", (3,)),
+            object_shapes=_shapes(objects),
+            half_lengths=_maybe(objects, "half_lengths", (3,)),
+            rotation_vectors=_maybe(objects, "rotation_vector", (3,)),
+            log_half_lengths_sigmas=_maybe(objects, "log_half_lengths_sigma", (3,)),
             dropped={int(one["id"]): str(one["reason"]) for one in content.get("dropped", [])},
             doubtful={int(one["id"]): str(one["doubt"]) for one in objects if one.get("doubt")},
             contradicted={
@@ -260,6 +300,26 @@ def _check(path: Path, found: MapObjects) -> None:
         row = int(np.argmax(wrong))
         message = f"objects row {row}: semi_axes and orientation_xyzw are of no ellipsoid"
         raise FileError(path, message)
+    given = np.isfinite(found.half_lengths).all(axis=1) & (found.half_lengths > 0.0).all(axis=1)
+    given &= np.isfinite(found.rotation_vectors).all(axis=1) & found.is_ellipsoid
+    if (found.is_body & ~given).any():
+        row = int(np.argmax(found.is_body & ~given))
+        shape = found.object_shapes[row].name.lower()
+        message = f"objects row {row}: a {shape} needs positive half_lengths and a rotation_vector"
+        raise FileError(path, message)
+
+
+def _shapes(objects: list[dict[str, Any]]) -> tuple[_core.Shape, ...]:
+    """Return the shape of each object; those without one are ellipsoids. Empty if all are."""
+    known = {name.lower(): _core.Shape[name] for name in ("ELLIPSOID", "CUBOID", "CYLINDER")}
+    shapes = []
+    for row, entry in enumerate(objects):
+        name = entry.get("shape") or "ellipsoid"
+        if name not in known:
+            expected = ", ".join(known)
+            raise ValueError(f"objects row {row}: shape {name!r} is none of {expected}")
+        shapes.append(known[name])
+    return () if set(shapes) <= {_core.Shape.ELLIPSOID} else tuple(shapes)
 
 
 def _column(objects: list[dict[str, Any]], name: str) -> list[Any]:

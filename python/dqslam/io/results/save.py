@@ -110,20 +110,31 @@ def write_estimate(
         write_covariances(directory / "covariance.csv", estimate, marginals.poses)
 
 
+def _shape_of(estimate: Estimate, row: int) -> str:
+    shapes = estimate.object_shapes
+    return (shapes[row] if shapes else _core.Shape.ELLIPSOID).name.lower()
+
+
 def _object(estimate: Estimate, row: int, marginals: Covariances | None) -> dict[str, Any]:
-    """Describe one object; the axes are null if its dual quadric is no ellipsoid."""
+    """Describe one object; shape and axes are null if its dual quadric is no ellipsoid."""
     semi_axes, orientation = None, None
     if estimate.is_ellipsoid[row]:
         _, semi_axes, orientation = _core.axes_from_ellipsoid(estimate.ellipsoids[row])
     described = {
         "id": int(estimate.object_ids[row]),
         "class_name": estimate.class_names[row],
+        "shape": None if semi_axes is None else _shape_of(estimate, row),
         "center": estimate.centers[row],
         "semi_axes": semi_axes,
         "orientation_xyzw": orientation,
         "dual_quadric": _core.dual_quadric_matrix(estimate.dual_quadrics[row]),
         "observations": int(estimate.observations[row]),
     }
+    if estimate.is_body[row]:
+        described |= {
+            "half_lengths": estimate.half_lengths[row],
+            "rotation_vector": estimate.landmarks[row, 6:9],
+        }
     doubt = estimate.doubtful.get(int(estimate.object_ids[row]))
     if doubt is not None:
         described["doubt"] = doubt
@@ -132,20 +143,10 @@ def _object(estimate: Estimate, row: int, marginals: Covariances | None) -> dict
     covariance = None if marginals is None else marginals.objects[row]
     if covariance is None or semi_axes is None or not np.isfinite(covariance).all():
         return described
-    return described | {
+    described |= {
         "center_covariance": covariance[:3, :3],
-        "log_semi_axes_sigma": np.sqrt(_log_axes_variance(estimate, row, covariance)),
+        "log_semi_axes_sigma": np.sqrt(estimate.log_semi_axes_variances(row, covariance)),
     }
-
-
-def _log_axes_variance(estimate: Estimate, row: int, covariance: Floats) -> Floats:
-    """Return the variances of the logarithms of the semi-axes, descending as these are, (3,)."""
-    if not estimate.is_body[row]:
-        jacobian = _core.log_semi_axes_jacobian(estimate.ellipsoids[row])
-        return np.diagonal(jacobian @ covariance @ jacobian.T)
-    # Each semi-axis of the equivalent ellipsoid is a fixed share of a half-length.
-    share = np.sqrt([5 / 3, 5 / 3, 5 / 3])
-    if estimate.object_shapes[row] == _core.Shape.CYLINDER:
-        share[:2] = np.sqrt(5 / 4)
-    order = np.argsort(-share * estimate.half_lengths[row])
-    return np.diagonal(covariance)[3:6][order]
+    if estimate.is_body[row]:
+        described["log_half_lengths_sigma"] = np.sqrt(np.diagonal(covariance)[3:6])
+    return described

@@ -68,8 +68,55 @@ const geometry = (() => {
     };
   }
 
+  /**
+   * The outline of an object: the ellipse of its shape or, of a cuboid or a cylinder, that of the
+   * ellipsoid that stands for it, with the hull of its points as `polygon`.
+   */
+  function outlineOfObject(view, lens, object, shape) {
+    const outline = outlineOf(view, lens, object.center, shape);
+    if (!outline || !object.body) return outline;
+    const points = object.body.hull.map((point) => inCamera(view, point));
+    if (points.some((point) => point[2] <= 0)) return null;
+    return { ...outline, polygon: hullOf(points.map((point) => pixelOf(lens, point))) };
+  }
+
+  /** The corners of the hull of points of the image, in order around it (monotone chain). */
+  function hullOf(points) {
+    const sorted = [...points].sort((a, b) => a[0] - b[0] || a[1] - b[1]);
+    const half = (order) => {
+      const chain = [];
+      for (const point of order) {
+        while (chain.length > 1 && turnOf(chain[chain.length - 2], chain[chain.length - 1], point) <= 0) chain.pop();
+        chain.push(point);
+      }
+      return chain.slice(0, -1);
+    };
+    return [...half(sorted), ...half(sorted.reverse())];
+  }
+
+  /** Twice the area of a triangle in the image. */
+  const turnOf = (a, b, c) => (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+
+  /** A path around an outline. */
+  function pathOf(outline) {
+    const path = new Path2D();
+    if (outline.polygon) {
+      outline.polygon.forEach(([u, v]) => path.lineTo(u, v));
+      path.closePath();
+    } else {
+      path.ellipse(outline.u, outline.v, outline.long, outline.short, outline.angle, 0, 2 * Math.PI);
+    }
+    return path;
+  }
+
   /** Whether a pixel is within an outline, which is made larger by a margin, pixels. */
   function contains(outline, u, v, margin = 0) {
+    if (outline.polygon) {
+      return outline.polygon.every((a, k, all) => {
+        const b = all[(k + 1) % all.length];
+        return turnOf(a, b, [u, v]) >= -margin * Math.hypot(b[0] - a[0], b[1] - a[1]);
+      });
+    }
     const du = u - outline.u, dv = v - outline.v;
     const c = Math.cos(outline.angle), s = Math.sin(outline.angle);
     const along = (c * du + s * dv) / (outline.long + margin);
@@ -79,6 +126,6 @@ const geometry = (() => {
 
   return {
     add, subtract, scale, dot, cross, length, unit, axesOf, viewOf, inCamera, toWorld, pixelOf,
-    shapeOf, outlineOf, contains,
+    shapeOf, outlineOf, outlineOfObject, hullOf, pathOf, contains,
   };
 })();

@@ -58,7 +58,7 @@ class ImageView {
     const found = [];
     objects.forEach((object, row) => {
       const outline = this.shapes[row] &&
-        geometry.outlineOf(view, camera, object.center, this.shapes[row]);
+        geometry.outlineOfObject(view, camera, object, this.shapes[row]);
       if (!outline) return;
       const inside = outline.u + outline.halfWidth > 0 && outline.u - outline.halfWidth < camera.width
         && outline.v + outline.halfHeight > 0 && outline.v - outline.halfHeight < camera.height;
@@ -68,15 +68,14 @@ class ImageView {
   }
 
   drawOutline(context, outline, color, seen, isSelected) {
-    context.beginPath();
-    context.ellipse(outline.u, outline.v, outline.long, outline.short, outline.angle, 0, 2 * Math.PI);
+    const path = geometry.pathOf(outline);
     context.setLineDash([]);
     context.globalAlpha = seen ? 1 : 0.35;
     context.fillStyle = color + (isSelected ? "66" : "2b");
-    if (seen || isSelected) context.fill();
+    if (seen || isSelected) context.fill(path);
     context.lineWidth = (isSelected ? 2.5 : 1.4) / this.scale;
     context.strokeStyle = color;
-    context.stroke();
+    context.stroke(path);
     context.globalAlpha = 1;
   }
 

@@ -1,5 +1,6 @@
 // The map in space, painted from far to near on a plain canvas: an ellipsoid is seen as an ellipse,
-// whose equation is that of its dual conic, so that neither meshes nor a graphics card are needed.
+// whose equation is that of its dual conic, and a cuboid or a cylinder as the hull of its points, so
+// that neither meshes nor a graphics card are needed.
 "use strict";
 
 const CIRCLE = Array.from({ length: 49 }, (_, k) => [Math.cos(k * Math.PI / 24), Math.sin(k * Math.PI / 24)]);
@@ -232,7 +233,7 @@ class SpaceView {
   /** Add an object as an outline or, where it is no ellipsoid, as a cross. */
   addOutline(items, object, shape, name, paint, style) {
     const { view, lens, near } = this.eye;
-    const outline = shape && geometry.outlineOf(view, lens, object.center, shape);
+    const outline = shape && geometry.outlineOfObject(view, lens, object, shape);
     if (outline && (Math.abs(outline.u - lens.cx) > lens.cx + outline.halfWidth
       || Math.abs(outline.v - lens.cy) > lens.cy + outline.halfHeight)) return;
     if (outline) {
@@ -263,15 +264,14 @@ class SpaceView {
 
   /** Fill an outline, and draw its line in a style, null for none. */
   fill(outline, fill, style) {
+    const path = geometry.pathOf(outline);
     this.context.fillStyle = fill;
-    this.context.beginPath();
-    this.context.ellipse(outline.u, outline.v, outline.long, outline.short, outline.angle, 0, 2 * Math.PI);
-    this.context.fill();
+    this.context.fill(path);
     if (!style) return;
     const { setLineDash = [], ...line } = style;
     Object.assign(this.context, line);
     this.context.setLineDash(setLineDash);
-    this.context.stroke();
+    this.context.stroke(path);
   }
 
   /** A gradient as if light came from the upper left. */
@@ -287,8 +287,15 @@ class SpaceView {
     return gradient;
   }
 
-  /** The three rings of the principal axes, as far as they face the eye: they show how it is turned. */
-  drawRings({ center, semiAxes, orientation }) {
+  /**
+   * The three rings of the principal axes, as far as they face the eye: they show how it is turned.
+   * Of a cuboid or a cylinder all edges.
+   */
+  drawRings({ center, semiAxes, orientation, body }) {
+    if (body) {
+      for (const line of body.lines) this.stroke(line, { strokeStyle: "#fff", globalAlpha: 0.55 });
+      return;
+    }
     const axes = geometry.axesOf(orientation);
     const toEye = geometry.subtract(this.eye.view.center, center);
     for (const [i, j] of [[0, 1], [1, 2], [2, 0]]) {
