@@ -64,7 +64,7 @@ def measure_harm(seeds: range) -> None:
     """Print the errors in the paper's world where rules are wrong for a fifth of the objects."""
     typer.echo("| wrong for 20 % | poses, m | centers, m |")
     typer.echo("|---|---|---|")
-    rows: dict[str, list[tuple[float, float]]] = {"no rules": []} | {name: [] for name in WRONG}
+    rows: dict[str, list[tuple[float, float]]] = {name: [] for name in ("no rules", *WRONG)}
     for seed in seeds:
         recording, truth = dq.simulate(dq.load_scenario("paper"), seed=seed)
         boxes = recording.detections

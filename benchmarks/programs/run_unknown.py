@@ -12,7 +12,8 @@ from dataclasses import replace
 import numpy as np
 
 from benchmarks.cases import CASES
-from benchmarks.programs.run_online import NOISE, spread
+from benchmarks.problems import NOISE
+from benchmarks.programs.run_online import spread
 from dqslam import Loss, OnlineSlam, Recording, SolveOptions, associate, build_graph, solve
 from dqslam._checks import Floats, Ints
 from dqslam.association import UNSURE, fill_in

@@ -134,6 +134,13 @@ def run(
             "took no part show, or a TOML file with the shape of each class.",
         ),
     ] = "ellipsoid",
+    placements: Annotated[
+        Path | None,
+        typer.Option(
+            help="TOML table of where objects of a class are: on a plane or on another object, "
+            "beside or aligned with one, upright."
+        ),
+    ] = None,
     hold_out: Annotated[
         float,
         typer.Option(
@@ -165,7 +172,7 @@ def run(
     together, the map is empty, or most boxes show nothing in it.
     """
     from dqslam import _core, io
-    from dqslam.assumptions import load_size_priors
+    from dqslam.assumptions import load_placements, load_size_priors
     from dqslam.pipeline import RunFilesOptions, run_files
     from dqslam.pipeline.files import WRITTEN_BY
 
@@ -188,6 +195,7 @@ def run(
         mode=_core.Mode[mode.upper()],
         size_prior=None if size_priors is None else load_size_priors(size_priors),
         shapes=parse_shapes(shapes),
+        placements=None if placements is None else load_placements(placements),
         estimate=split_names(estimate),
         hold_out=hold_out,
         seed=seed,

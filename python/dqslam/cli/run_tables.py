@@ -38,6 +38,16 @@ def _shapes(shapes: dict[str, Any]) -> str:
     )
 
 
+def _placements(placements: dict[str, Any]) -> str:
+    rows = placements["placements"]
+    counts = f"{sum(row['holds'] for row in rows)} of {len(rows)} hold"
+    planes = [
+        f"{len(plane['object_ids'])} objects at {plane['height_m']:.3g} m ± {plane['sigma_m']:.2g}"
+        for plane in placements["planes"]
+    ]
+    return "; ".join([counts, *planes])
+
+
 def _dropped(report: dict[str, Any]) -> list[tuple[str, str]]:
     return sorted(report["dropped_objects"].items(), key=lambda item: int(item[0]))
 
@@ -70,6 +80,8 @@ def _overview(report: dict[str, Any]) -> "Table":
         )
     if report["shapes"] is not None:
         table.add_row("shapes", _shapes(report["shapes"]))
+    if report["placements"] is not None:
+        table.add_row("placements", _placements(report["placements"]))
     table.add_row("re-projection", _reprojection(report["reprojection"]))
     table.add_row("noise of a box edge", _box_noise(report["box_noise"]))
     table.add_row("odometry noise", _noise(report["odometry_noise"]))

@@ -18,6 +18,7 @@ from dqslam.io import Trajectory
 from dqslam.pipeline.hold_out import describe_overlap, overlap_with_map
 from dqslam.pipeline.lens import detections_with_exact_boxes
 from dqslam.pipeline.options import RunOptions
+from dqslam.pipeline.placement_report import warn_of_placements
 from dqslam.pipeline.plausibility import find_doubtful
 from dqslam.pipeline.report import (
     box_chi2,
@@ -66,6 +67,8 @@ class EstimatorOutput:
     """What of the boxes' noise repeats from image to image, where that was estimated."""
     shapes: dict[str, Any] | None = None
     """Which objects are cuboids or cylinders, and why others are not, where that was asked."""
+    placements: dict[str, Any] | None = None
+    """Planes that objects stand on, and which placements hold, where rules were given."""
     evidence: dict[str, Any] | None = None
     """What boxes that took no part say for the estimate, against the odometry."""
     noise_levels: dict[str, float] = field(default_factory=dict)
@@ -149,6 +152,7 @@ def conclude(
             *warn_of_doubtful(estimate),
             *warn_of_contradictions(estimate),
             *warn_of_shapes(output.shapes),
+            *warn_of_placements(output.placements),
             *warn_of_bent_poses(output.marginals),
             *warn_of_calibration(output.calibration),
         ],
@@ -163,6 +167,7 @@ def conclude(
         },
         "objects": describe_objects(estimate, assigned, chi2, output.marginals),
         "shapes": output.shapes,
+        "placements": output.placements,
         "dropped_objects": {str(name): why for name, why in estimate.dropped.items()},
         "size_prior": describe_size_prior(output.size_prior),
         "reprojection": describe_overlap(overlap) | {"held_out": tests_held_out},

@@ -8,7 +8,14 @@ from pathlib import Path
 
 from dqslam import _core
 from dqslam.association import FINAL
-from dqslam.assumptions import BoxNoise, ClassShapes, OdometryNoise, SizePrior, SizePriors
+from dqslam.assumptions import (
+    BoxNoise,
+    ClassShapes,
+    OdometryNoise,
+    PlacementRules,
+    SizePrior,
+    SizePriors,
+)
 from dqslam.io import Extras, ReadOptions
 from dqslam.io.recording import Ids
 
@@ -33,6 +40,9 @@ class RunOptions:
     shapes: _core.Shape | ClassShapes | Mapping[str, _core.Shape] | None = None
     """Shape of all objects, or by class, as ``build_graph`` takes it. With AUTO, an object is a
     cuboid or a cylinder where that predicts boxes better that took no part. None is ELLIPSOID."""
+    placements: PlacementRules | None = None
+    """Where objects of a class are, as ``load_placements`` reads it. Up is z unless the
+    rules say another direction, or the cameras are held in another way."""
     estimates_noise: bool = False
     """Whether the level of the odometry's noise is estimated instead of believed."""
     estimate: tuple[str, ...] = ()

@@ -21,6 +21,7 @@ from dqslam.pipeline.lens import widened
 from dqslam.pipeline.measurements import usable_measurements, with_measurements
 from dqslam.pipeline.online import estimate_online
 from dqslam.pipeline.options import Progress, RunOptions
+from dqslam.pipeline.placements import with_placements
 from dqslam.pipeline.shapes import with_shapes
 from dqslam.recording import Recording
 
@@ -107,7 +108,7 @@ def run(
         bare = replace(known, positions=None, measurements=(), absolute=None, closures=None)
         calibrated = known
         output = with_measurements(estimator(bare, options, progress), known, options)
-    output = with_shapes(output, calibrated, options)
+    output = with_placements(with_shapes(output, calibrated, options), calibrated, options)
     output = replace(output, remarks=(*output.remarks, *remarks))
     # Boxes are judged as the calibration corrects them, and returned as they were given.
     shift = np.zeros((len(boxes), 4))

@@ -52,7 +52,11 @@ class Placements:
 
 
 def solve_with_placements(
-    graph: Graph, rules: PlacementRules, options: SolveOptions | None = None
+    graph: Graph,
+    rules: PlacementRules,
+    options: SolveOptions | None = None,
+    *,
+    start: _core.State | None = None,
 ) -> tuple[Graph, Estimate, _core.Summary, Placements]:
     """Estimate poses and objects with rules of where objects of a class are.
 
@@ -67,7 +71,7 @@ def solve_with_placements(
         The problem.
     rules
         Of ``load_placements``, or made of ``PlacementRule``.
-    options
+    options, start
         As for ``solve``.
 
     Returns
@@ -90,7 +94,7 @@ def solve_with_placements(
     if rules.up is not None:
         graph = _with_up(graph, rules.up)
     options = SolveOptions() if options is None else options
-    estimate, summary = solve(graph, options)
+    estimate, summary = solve(graph, options, start=start)
     placed, known = graph, len(graph.core.shared_sigma)
     rows: list[Row] = []
     planes: list[FoundPlane] = []
@@ -101,7 +105,7 @@ def solve_with_placements(
         if [_what(row) for row in rows] == before:
             break
         placed = _with_rows(graph, rows, planes, known)
-        estimate, summary = solve(placed, options)
+        estimate, summary = solve(placed, options, start=start)
     return placed, estimate, summary, _placements(placed, estimate, options, planes, known)
 
 

@@ -1,0 +1,70 @@
+"""Rules of where objects are, in a run."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import dqslam as dq
+from dqslam.metrics import true_rows
+from dqslam.pipeline.placement_report import warn_of_placements
+
+ON_A_PLANE = dq.PlacementRules((dq.PlacementRule("on", None, "plane", 0.01),))
+
+
+@pytest.fixture(scope="module")
+def table():
+    """Look at objects on a table, from an arc of a quarter."""
+    orbit = dq.load_scenario("orbit")
+    scenario = orbit.model_copy(
+        update={
+            "path": orbit.path.model_copy(update={"turns": 0.25, "poses": 35}),
+            "world": orbit.world.model_copy(update={"lift_max_m": 0.0}),
+        }
+    )
+    recording, truth = dq.simulate(scenario, seed=3)
+    return replace(recording, positions=None), truth
+
+
+def height_error(estimate, truth):
+    rows = true_rows(estimate.object_ids, truth)
+    # Without what all have in common: the start of the path is a pose of the odometry.
+    return (estimate.centers[:, 2] - truth.center[rows, 2]).std()
+
+
+@pytest.mark.parametrize("mode", [dq.Mode.SLAM, dq.Mode.MAPPING])
+def test_objects_on_a_table(table, mode):
+    recording, truth = table
+    if mode == dq.Mode.MAPPING:
+        recording = replace(recording, odometry=dq.Odometry.from_poses(truth.poses, covariance=np.eye(6)))
+    options = dq.RunOptions(mode=mode, trust_ids=1.0)
+    without = dq.run(recording, options)
+    result = dq.run(recording, replace(options, placements=ON_A_PLANE))
+    found = result.report["placements"]
+    (plane,) = found["planes"]
+    assert abs(plane["height_m"]) < 4 * plane["sigma_m"] < 0.2
+    assert len(plane["object_ids"]) >= 6
+    assert all(row["kind"] == "on" and row["other"] is None for row in found["placements"])
+    assert height_error(result.estimate, truth) < height_error(without.estimate, truth)
+    assert without.report["placements"] is None
+    moved = np.abs(result.estimate.poses - without.estimate.poses).max()
+    assert (moved == 0.0) == (mode == dq.Mode.MAPPING)
+
+
+def test_unknown_classes_are_named(table):
+    rules = dq.PlacementRules((dq.PlacementRule("on", "unicorn", "plane"),))
+    with pytest.raises(ValueError, match="no class 'unicorn' in the recording"):
+        dq.run(table[0], dq.RunOptions(placements=rules))
+
+
+def test_rules_that_do_not_hold_are_warned_of():
+    row = {"kind": "on", "object": 1, "class_name": "cup", "other": None}
+    rows = [row | {"holds": holds} for holds in (True, False, False)]
+    assert warn_of_placements(None) == []
+    assert warn_of_placements({"planes": [], "placements": rows[:2]}) == []
+    assert warn_of_placements({"planes": [], "placements": rows}) == [
+        "only 1 of 3 placements hold: are the rules, and up, right?"
+    ]
+    assert warn_of_placements({"planes": [], "placements": []}) == [
+        "no rule of placement holds for any object of the map"
+    ]
