@@ -130,7 +130,7 @@ def shape(
         if positions:
             with output.share("positions") as progress:
                 measured = surface.relative_positions(
-                    results, found_depth, options, progress=progress
+                    results, found_depth, found, progress=progress
                 )
             surface.write_positions(folder / "positions.csv", results, measured)
         with output.share("writing") as progress:

@@ -1,17 +1,18 @@
-"""Positions of objects relative to the camera, from the depth inside their boxes.
+"""Positions of objects relative to the camera, from depth images laid onto their fused surfaces.
 
-A pixel that shows an object tells the distance of its front. The body of the map says how far the
-center is behind the front at that pixel. The pixels of a box vote for the distance of the center;
-those of the background or of something in front of the object vote for another one.
-
-What depth does not measure, the position across the ray, is given with the size of the object as
-its sigma: boxes tell it, and must not be counted twice.
+The surface of an object is the mean of what all images saw. A single image shows where it is from
+there: the pixels of the object are moved until they lie on it, by a translation that leaves the
+least squares of their distances along its normals. What is measured is the center of the solid, in
+the frame of the camera. Directions that the normals do not determine, as along the only face that
+is seen, are known to the size of the object only.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -19,45 +20,43 @@ from dqslam._checks import Floats, Ints
 from dqslam._files import write_text
 from dqslam.io import Results, nearest_pose
 from dqslam.recording import RelativePositions
-from dqslam.surface.body import Body, bodies_of
+from dqslam.surface.color import vertex_normals
 from dqslam.surface.images import DepthImages
-from dqslam.surface.surfaces import SurfaceOptions
-from dqslam.surface.views import View, Views, poses_at
+from dqslam.surface.surfaces import Surface, Surfaces
+from dqslam.surface.views import View, Views
 
-# The sides of a box show the background, too: only this middle part of width and height is used.
-_MIDDLE = 0.8
-_PIXELS = 3000  # of a box that vote, at most
-# Votes of the pixels that agree: at least this share, and this number.
-_LEAST_SHARE, _LEAST_VOTES = 0.3, 20
-# Votes agree within this share of the body's depth, or so many sigmas of depth.
-_WITHIN, _SIGMAS = 0.15, 3.0
-# Sigma of the distance between front and center as a share of it, if the map does not know the
-# sizes of the object, and at least: no object is an ellipsoid.
-_UNKNOWN_SHAPE, _LEAST_SHAPE = 0.2, 0.1
-# A center that is further from that of the map than this multiple of the body is of something else.
-_FURTHEST = 2.0
+_PIXELS = 3000  # of an object that are laid onto its surface, at most
+_LEAST_PIXELS = 50
+_STEPS = 8
+# Pixels further from the surface than this multiple of the spread of the others do not count.
+_OUTLIER = 3.0
+# Errors of neighboring pixels are alike: all together are worth so many independent ones.
+_INDEPENDENT = 10.0
+# The surface itself is known to this share of a voxel.
+_SURFACE = 0.3
 _COLUMNS = ("timestamp", "object", "x", "y", "z", "c11", "c12", "c13", "c22", "c23", "c33")
 
 
 def relative_positions(
     results: Results,
     depth: DepthImages,
-    options: SurfaceOptions | None = None,
+    surfaces: Surfaces,
     *,
     progress: Callable[[float], None] = lambda share: None,
 ) -> RelativePositions:
     """Measure the centers of objects in the camera frame, one for each box that depth explains.
 
-    ``pose`` are rows of the poses of the results, and ids those of the map. Boxes without an object
-    that is an ellipsoid, without a depth image, or most of whose depth shows something else have
-    none.
+    ``pose`` are rows of the poses of the results, and ids those of the map. A box has no position
+    if its object has no surface, its pose no depth image, or depth shows too little of the object.
 
     Parameters
     ----------
     results
         Map, path and boxes, from ``load_results``.
     depth
-        Images of the camera of the results; for each pose, the one nearest in time is used.
+        The images from which the surfaces were fused; for each pose, the one nearest in time.
+    surfaces
+        What ``fuse_surfaces`` returned for these results.
 
     Raises
     ------
@@ -66,28 +65,23 @@ def relative_positions(
     FileError
         If an image cannot be read, or is not of the camera's size.
     """
-    how, boxes = options or SurfaceOptions(), results.boxes
+    boxes = results.boxes
     if boxes is None:
         raise ValueError(f"{results.directory}: has no boxes.csv, whose boxes positions are of")
     views = Views.along(results.camera, results.timestamps, results.poses, depth)
-    bodies = bodies_of(results.objects)
-    row_of = {int(number): row for row, number in enumerate(results.objects.object_ids)}
+    models = {one.object_id: _Model.of(one) for one in surfaces.surfaces}
     found: list[tuple[int, int, Floats, Floats]] = []
     images = _images_of(results.timestamps, views)
     poses = np.unique(boxes.pose).tolist()
     for done, pose in enumerate(poses, start=1):
-        own = [row for row in np.flatnonzero(boxes.pose == pose).tolist()
-               if row_of.get(int(boxes.object_id[row]), -1) in bodies]
+        ids = np.unique(boxes.object_id[boxes.pose == pose]).tolist()
+        own = [number for number in ids if number in models]
         if own and images[pose] >= 0:
             view = views.view(int(images[pose]))
-            for row in own:
-                number = int(boxes.object_id[row])
-                place = row_of[number]
-                sigmas = results.objects.log_semi_axes_sigmas[place]
-                measured = _position(view, bodies[place], boxes.box[row], sigmas, how.depth_noise)
+            for number in own:
+                measured = models[number].position(view)
                 if measured is not None:
-                    moved = _at_pose(*measured, view, results.poses[pose])
-                    found.append((pose, number, *moved))
+                    found.append((pose, number, *_at_pose(*measured, results.poses[pose])))
         progress(done / len(poses))
     return RelativePositions(
         pose=np.array([one[0] for one in found], dtype=np.int64),
@@ -108,78 +102,104 @@ def _images_of(timestamps: Floats, views: Views) -> Ints:
     return np.where(off <= 0.5 * usual, rows, -1)
 
 
-def _position(
-    view: View, body: Body, box: Floats, log_sigmas: Floats, noise: float
-) -> tuple[Floats, Floats] | None:
-    """Return the center (3,) of an object in the camera frame, and its covariance (3, 3)."""
-    u, v = _pixels(view, box)
-    behind, center = _center_behind_front(view, body, u, v)
-    depth = view.depth[v, u]
-    votes = (depth + behind)[(depth > 0.0) & np.isfinite(behind)]
-    if votes.size < _LEAST_VOTES:
-        return None
-    ray = center / np.linalg.norm(center)
-    turn = view.world_from_camera.T @ body.world_from_object
-    half = body.support(turn.T @ ray)
-    sigma_depth = noise * float(np.median(votes)) ** 2
-    width = max(_WITHIN * half, _SIGMAS * sigma_depth)
-    votes = np.sort(votes)
-    # The place where most votes lie within the width to both sides.
-    count = np.searchsorted(votes, votes + width) - np.searchsorted(votes, votes - width)
-    peak = votes[np.argmax(count)]
-    agree = votes[np.abs(votes - peak) <= 2.0 * width]
-    if count.max() < max(_LEAST_SHARE * votes.size, _LEAST_VOTES):
-        return None
-    distance = float(np.median(agree))
-    if abs(distance - center[2]) > _FURTHEST * half:
-        return None
-    spread = 1.4826 * float(np.median(np.abs(agree - distance)))
-    known = log_sigmas[np.isfinite(log_sigmas)]
-    shape = max(float(known.max()), _LEAST_SHAPE) if known.size else _UNKNOWN_SHAPE
-    along = spread**2 + sigma_depth**2 + (shape * half) ** 2
-    across = float(body.semi_axes.max()) ** 2
-    outer = np.outer(ray, ray)
-    return center * (distance / center[2]), along * outer + across * (np.eye(3) - outer)
+@dataclass(frozen=True, eq=False)
+class _Model:
+    """A surface to lay images onto, in the world."""
+
+    surface: Surface
+    vertices: Floats
+    normals: Floats
+    tree: Any
+    """Finds the nearest of the vertices."""
+    center: Floats
+    """Of the solid, shape (3,)."""
+    center_sigma: float
+    """What is not known of the center, because parts of the surface were not seen, meters."""
+
+    @classmethod
+    def of(cls, one: Surface) -> _Model:
+        from scipy.spatial import KDTree
+
+        solid = one.solid
+        used = np.unique(solid.faces[solid.seen])
+        normals = vertex_normals(solid.vertices, solid.faces)[used]
+        vertices = one.to_world(solid.vertices[used])
+        size = float(np.cbrt(abs(solid.volume)))
+        return cls(
+            surface=one,
+            vertices=vertices,
+            normals=normals @ one.world_from_object.T,
+            tree=KDTree(vertices),
+            center=one.to_world(solid.center),
+            center_sigma=0.5 * (1.0 - one.seen_share) * size,
+        )
+
+    def position(self, view: View) -> tuple[Floats, Floats] | None:
+        """Return where an image shows the center in the world, and the covariance of that."""
+        points = self._points(view)
+        moved = np.zeros(3)
+        reach = 2.0 * self.surface.truncation
+        normal, rest = np.zeros((0, 3)), np.zeros(0)
+        for _ in range(_STEPS):
+            away, row = self.tree.query(points - moved, distance_upper_bound=reach)
+            near = np.isfinite(away)
+            if near.sum() < _LEAST_PIXELS:
+                return None
+            normal = self.normals[row[near]]
+            rest = ((points[near] - moved - self.vertices[row[near]]) * normal).sum(axis=1)
+            keep = np.abs(rest - np.median(rest)) <= _OUTLIER * _spread(rest)
+            if keep.sum() < _LEAST_PIXELS:
+                return None
+            normal, rest = normal[keep], rest[keep]
+            # Directions without normals stay where they are.
+            weak = 1e-3 * np.eye(3)
+            step = np.linalg.solve(normal.T @ normal / len(normal) + weak, normal.T @ rest) / len(
+                normal
+            )
+            moved = moved + step
+            reach = self.surface.truncation
+        size2 = float(np.sum(np.var(self.vertices, axis=0)))
+        spread = max(_spread(rest), _SURFACE * self.surface.voxel)
+        facts = _INDEPENDENT / spread**2 * (normal.T @ normal) / len(normal)
+        known = np.linalg.inv(facts + np.eye(3) / size2)
+        shared = (_SURFACE * self.surface.voxel) ** 2 + self.center_sigma**2
+        return self.center + moved, known + shared * np.eye(3)
+
+    def _points(self, view: View) -> Floats:
+        """Return the places in the world of pixels that may show the object, (p, 3)."""
+        camera, in_camera = view.camera, view.to_camera(self.vertices)
+        x, y, z = in_camera[in_camera[:, 2] > 0.0].T
+        if not z.size:
+            return np.zeros((0, 3))
+        u, v = camera.fx * x / z + camera.cx, camera.fy * y / z + camera.cy
+        last = np.array([camera.width, camera.height]) - 1
+        low = np.clip(np.floor([u.min(), v.min()]), 0, last).astype(int)
+        high = np.clip(np.ceil([u.max(), v.max()]), 0, last).astype(int)
+        step = max(1, int(np.sqrt(np.prod(high - low + 1) / _PIXELS)))
+        u, v = np.meshgrid(
+            np.arange(low[0], high[0] + 1, step), np.arange(low[1], high[1] + 1, step)
+        )
+        depth = view.depth[v, u].astype(float)
+        rays = np.stack([(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, 0.0 * u + 1], -1)
+        points = (rays * depth[..., None])[depth > 0.0] @ view.world_from_camera.T + view.center
+        in_object = self.surface.to_object(points)
+        keep = np.ones(len(points), dtype=np.bool_)
+        for plane in self.surface.planes:
+            keep &= plane.height(in_object) > self.surface.truncation
+        return points[keep]
 
 
-def _pixels(view: View, box: Floats) -> tuple[Ints, Ints]:
-    """Return pixels of the middle of a box, on a grid."""
-    camera, middle = view.camera, 0.5 * (box[:2] + box[2:])
-    half = 0.5 * _MIDDLE * (box[2:] - box[:2])
-    low = np.maximum(np.ceil(middle - half), 0).astype(int)
-    high = np.minimum(np.floor(middle + half), [camera.width - 1, camera.height - 1]).astype(int)
-    step = max(1, int(np.sqrt(np.prod(np.maximum(high - low, 1)) / _PIXELS)))
-    u, v = np.meshgrid(np.arange(low[0], high[0] + 1, step), np.arange(low[1], high[1] + 1, step))
-    return u.reshape(-1), v.reshape(-1)
+def _spread(values: Floats) -> float:
+    return 1.4826 * float(np.median(np.abs(values - np.median(values))))
 
 
-def _center_behind_front(view: View, body: Body, u: Ints, v: Ints) -> tuple[Floats, Floats]:
-    """Return how much deeper the center is than the front at pixels (p,), and the center (3,).
-
-    NaN where a pixel does not show the body as it is in the map.
-    """
-    camera, turn = view.camera, view.world_from_camera.T @ body.world_from_object
-    center = view.to_camera(body.center)
-    rays = np.column_stack([(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, 0.0 * u + 1])
-    d = rays @ turn / body.semi_axes
-    o = center @ turn / body.semi_axes
-    a, b, c = (d * d).sum(axis=1), d @ o, o @ o - 1.0
-    with np.errstate(invalid="ignore"):
-        front = (b - np.sqrt(b * b - a * c)) / a
-    return np.where(front > 0.0, center[2] - front, np.nan), center
-
-
-def _at_pose(
-    center: Floats, covariance: Floats, view: View, pose: Floats
-) -> tuple[Floats, Floats]:
-    """Move a center in the camera of an image to the camera of a pose, a moment apart."""
+def _at_pose(center: Floats, covariance: Floats, pose: Floats) -> tuple[Floats, Floats]:
+    """Return a center and a covariance of the world in the camera frame of a pose."""
     from scipy.spatial.transform import Rotation
 
     camera_from_world = Rotation.from_quat(pose[3:]).as_matrix().T
-    turn = camera_from_world @ view.world_from_camera
-    moved = camera_from_world @ (view.center - pose[:3])
-    turned = turn @ covariance @ turn.T
-    return turn @ center + moved, 0.5 * (turned + turned.T)
+    turned = camera_from_world @ covariance @ camera_from_world.T
+    return camera_from_world @ (center - pose[:3]), 0.5 * (turned + turned.T)
 
 
 def write_positions(path: Path, results: Results, found: RelativePositions) -> None:

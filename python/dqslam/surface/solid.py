@@ -49,6 +49,14 @@ class Solid:
         return float((self.vertices[self.faces[:, 0]] * self._crosses()).sum() / 6.0)
 
     @property
+    def center(self) -> Floats:
+        """The center of gravity, meters, shape (3,)."""
+        a, b, c = (self.vertices[self.faces[:, corner]] for corner in range(3))
+        parts = (a * self._crosses()).sum(axis=1) / 6.0  # signed, of tetrahedra to the origin
+        # Of a closed surface, tetrahedra to any point give the same; this one is near.
+        return np.asarray((parts @ ((a + b + c) / 4.0)) / parts.sum())
+
+    @property
     def seen_share(self) -> float:
         """The share of the surface, apart from where it stands, that images saw."""
         areas = self.areas

@@ -70,6 +70,21 @@ class Surface:
         return f"Surface({name}, {len(self.faces)} faces, {100 * self.seen_share:.0f}% seen)"
 
     @property
+    def world_from_object(self) -> Floats:
+        """Rotation matrix (3, 3) of the frame in the world when the surface was fused."""
+        from scipy.spatial.transform import Rotation
+
+        return np.asarray(Rotation.from_quat(self.orientation_xyzw).as_matrix())
+
+    def to_world(self, points_in_object: Floats) -> Floats:
+        """Return points (p, 3) or (3,) in the world as it was when the surface was fused."""
+        return np.asarray(points_in_object @ self.world_from_object.T + self.center)
+
+    def to_object(self, points_in_world: Floats) -> Floats:
+        """Return points (p, 3) or (3,) of that world in the frame of the object."""
+        return np.asarray((points_in_world - self.center) @ self.world_from_object)
+
+    @property
     def volume(self) -> float:
         """Of the closed solid, cubic meters."""
         return self.solid.volume
