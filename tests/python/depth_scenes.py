@@ -148,9 +148,9 @@ def results_of(poses, bodies, camera=CAMERA, times=None, directory="results"):
             class_names=("thing",) * count,
             centers=np.array([body.center for body in bodies]).reshape(-1, 3),
             semi_axes=np.array([body.fitted for body in bodies]).reshape(-1, 3),
-            orientations=Rotation.from_matrix(
-                np.array([body.turn for body in bodies])
-            ).as_quat().reshape(-1, 4),
+            orientations=np.array(
+                [Rotation.from_matrix(body.turn).as_quat() for body in bodies]
+            ).reshape(-1, 4),
             dual_quadrics=np.full((count, 9), np.nan),
             observations=np.full(count, len(poses)),
             center_covariances=np.full((count, 3, 3), np.nan),

@@ -18,6 +18,8 @@ from dqslam.surface.images import Depth, DepthImages
 _GAP = 5.0
 # Normals are slopes of depth over so many pixels to both sides.
 _SLOPE_PX = 4
+# Neighboring pixels whose depth differs by more than this share show an outline between them.
+_JUMP = 0.03
 # The least share of a ray that is perpendicular to a surface: noise of normals must not reach 0.
 _LEAST_COSINE = 0.2
 
@@ -59,6 +61,22 @@ class View:
         return np.where(np.isfinite(found), np.clip(found, _LEAST_COSINE, straight), 1.0).astype(
             np.float32
         )
+
+
+    @cached_property
+    def to_outline(self) -> Depth:
+        """How far a pixel's surface is from the nearest outline across the ray, m, (height, width).
+
+        An outline is where depth jumps or is missing.
+        """
+        from scipy import ndimage
+
+        depth = self.depth
+        low = ndimage.minimum_filter(depth, size=3, mode="nearest")
+        high = ndimage.maximum_filter(depth, size=3, mode="nearest")
+        jumps = (low <= 0.0) | (high - low > _JUMP * depth)
+        pixels = ndimage.distance_transform_edt(~jumps)
+        return (pixels * depth / min(self.camera.fx, self.camera.fy)).astype(np.float32)
 
 
 def _slope(values: Depth, axis: int) -> Depth:

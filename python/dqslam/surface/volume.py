@@ -19,6 +19,9 @@ _EDGE = 1.0
 _NEAREST = 0.05
 # Behind a surface, distances count in full down to this share of the truncation, and then less.
 _SURE_BEHIND = 0.5
+# Behind an edge of an object, rays leave it again. Distances behind a surface count up to that from
+# the pixel to the nearest outline, where rays are inside for certain, or so many voxels.
+_THIN_VOXELS = 1.5
 # A voxel is clearly free if it is before the surface of a pixel by so many sigmas of depth, and by
 # this share of the truncation, which allows for errors of poses.
 _CLEAR_SIGMAS, _CLEAR_SHARE = 2.5, 0.4
@@ -127,7 +130,9 @@ class Volume:
         seen, z, facing = seen[keep], z[keep], facing[keep]
         depth = self._interpolated(view.depth, u[keep], v[keep], depth[keep])
         distance = (depth - z) * facing / np.float32(self.truncation)
-        keep = distance > -1.0
+        outline = view.to_outline[near_v[keep], near_u[keep]]
+        behind = np.maximum(outline, np.float32(_THIN_VOXELS * self.voxel))
+        keep = distance > -np.minimum(behind / np.float32(self.truncation), 1.0)
         seen, depth, facing, distance = seen[keep], depth[keep], facing[keep], distance[keep]
         # Sigma of depth grows with depth squared. It is of depth, not of the distance along the
         # normal, which a slanted surface makes smaller; but there the pixel itself is less sure.
