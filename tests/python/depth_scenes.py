@@ -3,14 +3,16 @@
 The world has z up. Rays are (x, y, 1) in the camera frame, so that depth is the ray's parameter.
 """
 
+import json
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from PIL import Image
 from scipy.spatial.transform import Rotation
 
 import dqslam as dq
-from dqslam.io import MapObjects, Results
+from dqslam.io import MapObjects, Results, write_trajectory
 
 
 @dataclass(frozen=True)
@@ -159,6 +161,35 @@ def results_of(poses, bodies, camera=CAMERA, times=None, directory="results"):
         boxes=None,
         report={},
     )
+
+
+def write_files(folder, results, depth, scale=5000):
+    """Write a directory of results, and its depth images as 16-bit PNG in a folder beside it."""
+    folder.mkdir()
+    mapped, camera = results.objects, results.camera
+    for name in ("trajectory.txt", "odometry.txt"):
+        write_trajectory(folder / name, results.timestamps, results.poses)
+    names = ("fx", "fy", "cx", "cy", "width", "height")
+    text = json.dumps({name: getattr(camera, name) for name in names})
+    (folder / "camera.json").write_text(text)
+    objects = [
+        {
+            "id": int(mapped.object_ids[row]),
+            "class_name": mapped.class_names[row],
+            "center": mapped.centers[row].tolist(),
+            "semi_axes": mapped.semi_axes[row].tolist(),
+            "orientation_xyzw": mapped.orientations[row].tolist(),
+            "observations": int(mapped.observations[row]),
+        }
+        for row in range(len(mapped))
+    ]
+    (folder / "map.json").write_text(json.dumps({"objects": objects, "dropped": []}))
+    images = folder.parent / "depth"
+    images.mkdir()
+    for time, image in zip(results.timestamps, depth, strict=True):
+        values = np.rint(scale * image).astype(np.uint16)
+        Image.fromarray(values).save(images / f"{time:.6f}.png")
+    return images
 
 
 def in_world(surface):

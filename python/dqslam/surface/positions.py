@@ -27,7 +27,7 @@ from dqslam.surface.views import View, Views
 
 _PIXELS = 3000  # of an object that are laid onto its surface, at most
 _LEAST_PIXELS = 50
-_STEPS = 8
+_STEPS, _STEP_M = 30, 1e-5  # at most, and what ends them before
 # Pixels further from the surface than this multiple of the spread of the others do not count.
 _OUTLIER = 3.0
 # Errors of neighboring pixels are alike: all together are worth so many independent ones.
@@ -158,6 +158,8 @@ class _Model:
             )
             moved = moved + step
             reach = self.surface.truncation
+            if np.linalg.norm(step) < _STEP_M:
+                break
         size2 = float(np.sum(np.var(self.vertices, axis=0)))
         spread = max(_spread(rest), _SURFACE * self.surface.voxel)
         facts = _INDEPENDENT / spread**2 * (normal.T @ normal) / len(normal)
