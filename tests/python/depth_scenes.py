@@ -194,4 +194,5 @@ def write_files(folder, results, depth, scale=5000):
 
 def in_world(surface):
     """Return the vertices of a surface in the world, (v, 3)."""
-    return Rotation.from_quat(surface.orientation_xyzw).apply(surface.vertices) + surface.center
+    turn = Rotation.from_quat(surface.orientation_xyzw).as_matrix()
+    return surface.vertices @ turn.T + surface.center

@@ -183,7 +183,7 @@ def test_ctrl_c_leaves_nothing(files, monkeypatch, capsys):
 
 
 def test_a_real_cabinet(tmp_path, capsys):
-    """The path is that of motion capture; the reference is a cuboid of planes, good to 1 to 2 cm."""
+    """The path is of motion capture; the reference is a cuboid of planes, good to 1 to 2 cm."""
     from scipy.spatial.transform import Rotation
 
     folder, images = recording("tum_fr3_cabinet"), recording("tum_fr3_cabinet_images")
@@ -199,7 +199,9 @@ def test_a_real_cabinet(tmp_path, capsys):
     numbers = np.array(cells, dtype=float)
     turn, sides = Rotation.from_quat(numbers[3:7]).as_matrix(), numbers[7:]
     mesh = dq.surface.read_meshes(out / "surfaces")[0]
-    in_world = Rotation.from_quat(one["orientation_xyzw"]).apply(mesh.vertices) + one["center"]
+    in_world = (
+        Rotation.from_quat(one["orientation_xyzw"]).apply(np.array(mesh.vertices)) + one["center"]
+    )
     reference = Cuboid(numbers[:3], turn, sides / 2)
     assert np.median(np.abs(reference.distance(in_world))) < 0.006
     assert one["volume_m3"] == pytest.approx(sides.prod(), rel=0.06)

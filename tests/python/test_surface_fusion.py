@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import dqslam as dq
 from depth_scenes import (
@@ -183,7 +184,7 @@ def test_vertices_have_the_colors_of_the_side_that_images_show():
     u, v = np.meshgrid(np.arange(CAMERA.width), np.arange(CAMERA.height))
 
     def read(row):
-        turn = dq_rotation(poses[row])
+        turn = Rotation.from_quat(poses[row, 3:]).as_matrix()
         ray = np.stack([(u - CAMERA.cx) / CAMERA.fx, (v - CAMERA.cy) / CAMERA.fy, 1 + 0 * u], -1)
         x = (ray * depth[row][..., None] @ turn.T + poses[row, :3])[..., 0]
         image = np.where((x > 0)[..., None], [255, 0, 0], [0, 0, 255])
@@ -198,9 +199,3 @@ def test_vertices_have_the_colors_of_the_side_that_images_show():
     assert green.max() < 80
     assert (red > 150)[x[sure] > 0].mean() > 0.99
     assert (blue > 150)[x[sure] < 0].mean() > 0.99
-
-
-def dq_rotation(pose):
-    from scipy.spatial.transform import Rotation
-
-    return Rotation.from_quat(pose[3:]).as_matrix()

@@ -117,7 +117,7 @@ def _read_mesh(path: Path, object_id: int) -> Mesh:
     if not path.is_file():
         raise FileError(path, "no such file")
     try:
-        mesh = trimesh.load(path, process=False, force="mesh")
+        mesh: Any = trimesh.load(path, process=False, force="mesh")
         vertices = as_floats("vertices", mesh.vertices, [None, 3])
         faces = np.asarray(mesh.faces, dtype=np.int64).reshape(-1, 3)
     except Exception as error:  # whatever trimesh raises on a wrong file

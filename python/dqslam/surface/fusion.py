@@ -24,6 +24,7 @@ VOXELS_AT_ONCE = 20_000_000
 MOST_VOXELS = 50_000_000  #: of one object
 _VOXELS_ALONG = 128
 _TRUNCATION_VOXELS, _TRUNCATION_SIGMAS = 4.0, 4.0
+_FUSING = 0.6  # the share of the work, if there are colors, too
 _SCALE_IMAGES = 40  # that are compared with the map before any is fused
 
 Progress = Callable[[float], None]
@@ -81,13 +82,10 @@ def fuse_surfaces(
             volumes[row] = volume
     found: list[Surface] = []
     batches = _batches(volumes)
+    fusing = 1.0 if colors is None else _FUSING
     for number, batch in enumerate(batches):
-
-        def passed(share: float, done: int = number) -> None:
-            progress((done + share) / len(batches))
-
-        half = 1.0 if colors is None else 0.6  # of the work is the fusion
-        _fuse(batch, views, lambda share, passed=passed, half=half: passed(half * share))
+        first, last = number / len(batches), (number + fusing) / len(batches)
+        _fuse(batch, views, _between(progress, first, last))
         made = {}
         for row, volume in batch.items():
             surface = _surface(results, row, volume, bodies, how)
@@ -96,11 +94,15 @@ def fuse_surfaces(
             else:
                 made[row] = surface
         if colors is not None:
-            _paint(
-                made, results, views, colors, lambda share, passed=passed: passed(0.6 + 0.4 * share)
-            )
+            rest = _between(progress, last, (number + 1) / len(batches))
+            _paint(made, results, views, colors, rest)
         found += made.values()
     return Surfaces(tuple(found), left_out, len(views), len(depth) - len(views))
+
+
+def _between(progress: Progress, first: float, last: float) -> Progress:
+    """Return the progress of a part of the work, from one share of all to another."""
+    return lambda share: progress(first + share * (last - first))
 
 
 def _check_scale(views: Views, bodies: dict[int, Body], scale: float | None) -> None:

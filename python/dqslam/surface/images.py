@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dqslam import _core
-from dqslam._checks import Floats, as_floats
+from dqslam._checks import Bools, Floats, as_floats
 from dqslam.io.files import FileError
 from dqslam.io.frames import FrameTimes
 from dqslam.io.images import timed_images
@@ -179,7 +179,7 @@ def _sources(camera: _core.Camera) -> NDArray[np.int64] | None:
         return None
     grid = np.meshgrid(np.arange(camera.width, dtype=float), np.arange(camera.height, dtype=float))
     source = recorded_pixels(camera, np.stack(grid, axis=-1))
-    inside = np.isfinite(source).all(axis=2)
+    inside: Bools = np.asarray(np.isfinite(source).all(axis=2))
     place = np.rint(np.where(inside[..., None], source, -1.0)).astype(np.int64)
     inside &= ((place >= 0) & (place < [camera.width, camera.height])).all(axis=2)
     return np.where(inside[..., None], place[..., ::-1], -1)

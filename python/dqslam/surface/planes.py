@@ -53,7 +53,7 @@ def surface_points(volume: Volume) -> tuple[Floats, Floats]:
     for axis in range(3):
         low, high = [slice(None)] * 3, [slice(None)] * 3
         low[axis], high[axis] = slice(None, -1), slice(1, None)
-        a, b = distance[tuple(low)], distance[tuple(high)]
+        a, b = np.asarray(distance[tuple(low)]), np.asarray(distance[tuple(high)])
         crosses = seen[tuple(low)] & seen[tuple(high)] & ((a < 0.0) != (b < 0.0))
         crosses &= np.abs(a - b) < 1.0  # not from one free side to the back of the other
         index = np.argwhere(crosses)

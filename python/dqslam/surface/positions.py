@@ -46,7 +46,8 @@ def relative_positions(
 ) -> RelativePositions:
     """Measure the centers of objects in the camera frame, one for each box that depth explains.
 
-    ``pose`` are rows of the poses of the results, and ids those of the map. A box has no position
+    ``pose`` are rows of the poses of the results, and ids those of the map. Results have no robot:
+    ``object_in_robot`` is in the camera frame. A box has no position
     if its object has no surface, its pose no depth image, or depth shows too little of the object.
 
     Parameters
@@ -188,7 +189,7 @@ class _Model:
         keep = np.ones(len(points), dtype=np.bool_)
         for plane in self.surface.planes:
             keep &= plane.height(in_object) > self.surface.truncation
-        return points[keep]
+        return np.asarray(points[keep])
 
 
 def _spread(values: Floats) -> float:

@@ -41,7 +41,7 @@ class Solid:
     @property
     def areas(self) -> Floats:
         """Areas of the faces, square meters, shape (f,)."""
-        return 0.5 * np.linalg.norm(self._crosses(), axis=1)
+        return np.asarray(0.5 * np.linalg.norm(self._crosses(), axis=1))
 
     @property
     def volume(self) -> float:
@@ -120,8 +120,10 @@ def solid_of(volume: Volume, planes: Sequence[Plane], others: Sequence[Body]) ->
 
 def _grid_points(volume: Volume) -> Floats:
     """Return the centers of all voxels in the frame of the object, shape (i, j, k, 3)."""
-    axes = [origin + volume.voxel * np.arange(count)
-            for origin, count in zip(volume.origin, volume.shape, strict=True)]
+    axes = [
+        origin + volume.voxel * np.arange(count)
+        for origin, count in zip(volume.origin, volume.shape, strict=True)
+    ]
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
 
 
@@ -167,15 +169,13 @@ def _down_to(
     ground = -height[tuple(slab.T)] / volume.truncation
     field, measured = field.copy(), measured.copy()
     field[tuple(slab.T)] = np.maximum(above, ground)
-    measured[tuple(slab.T)] = ndimage.map_coordinates(
-        measured.astype(np.float32), places, order=0, mode="nearest"
-    ) > 0.5
+    measured[tuple(slab.T)] = (
+        ndimage.map_coordinates(measured.astype(np.float32), places, order=0, mode="nearest") > 0.5
+    )
     return field, measured
 
 
-def _meshed(
-    field: Array, measured: Bools, planes: Sequence[Plane], volume: Volume
-) -> Solid | None:
+def _meshed(field: Array, measured: Bools, planes: Sequence[Plane], volume: Volume) -> Solid | None:
     from skimage.measure import marching_cubes
 
     padded = np.pad(field, 1, constant_values=1.0)

@@ -62,7 +62,6 @@ class View:
             np.float32
         )
 
-
     @cached_property
     def to_outline(self) -> Depth:
         """How far a pixel's surface is from the nearest outline across the ray, m, (height, width).
@@ -86,7 +85,7 @@ def _slope(values: Depth, axis: int) -> Depth:
     low = np.clip(np.arange(count) - _SLOPE_PX, 0, count - 1)
     high = np.clip(np.arange(count) + _SLOPE_PX, 0, count - 1)
     width = (high - low).astype(np.float32).reshape(-1, *[1] * (moved.ndim - 1))
-    return np.moveaxis((moved[high] - moved[low]) / width, 0, axis)
+    return np.asarray(np.moveaxis((moved[high] - moved[low]) / width, 0, axis))
 
 
 @dataclass(frozen=True, eq=False)

@@ -139,9 +139,7 @@ class Volume:
         weight = facing * facing / np.square(np.square(depth))
         weight *= np.clip((1.0 + distance) / (1.0 - _SURE_BEHIND), 0.0, 1.0)
         is_before = distance >= 0.0
-        self._before.add(
-            seen[is_before], np.minimum(distance[is_before], 1.0), weight[is_before]
-        )
+        self._before.add(seen[is_before], np.minimum(distance[is_before], 1.0), weight[is_before])
         self._behind.add(seen[~is_before], distance[~is_before], weight[~is_before])
         sigma = np.float32(self.noise / self.truncation) * depth * depth * facing
         is_clear = distance > np.maximum(_CLEAR_SIGMAS * sigma, _CLEAR_SHARE)
