@@ -10,7 +10,7 @@ import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -117,7 +117,7 @@ def _read_mesh(path: Path, object_id: int) -> Mesh:
     if not path.is_file():
         raise FileError(path, "no such file")
     try:
-        mesh: Any = trimesh.load(path, process=False, force="mesh")
+        mesh = cast(Any, trimesh.load(path, process=False, force="mesh"))
         vertices = as_floats("vertices", mesh.vertices, [None, 3])
         faces = np.asarray(mesh.faces, dtype=np.int64).reshape(-1, 3)
     except Exception as error:  # whatever trimesh raises on a wrong file

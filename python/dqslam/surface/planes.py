@@ -58,9 +58,9 @@ def surface_points(volume: Volume) -> tuple[Floats, Floats]:
         crosses &= np.abs(a - b) < 1.0  # not from one free side to the back of the other
         index = np.argwhere(crosses)
         place = index.astype(float)
-        place[:, axis] += (a / (a - b + (a == b)))[crosses]
+        place[:, axis] += np.asarray(a / (a - b + (a == b)))[crosses]
         points.append(volume.points(place))
-        normals.append(np.stack([slope[tuple(index.T)] for slope in slopes], axis=1))
+        normals.append(np.stack([np.asarray(one)[tuple(index.T)] for one in slopes], axis=1))
     normal = np.concatenate(normals).astype(float)
     length = np.linalg.norm(normal, axis=1)
     keep = length > 0.0

@@ -75,7 +75,8 @@ class View:
         high = ndimage.maximum_filter(depth, size=3, mode="nearest")
         jumps = (low <= 0.0) | (high - low > _JUMP * depth)
         pixels = ndimage.distance_transform_edt(~jumps)
-        return (pixels * depth / min(self.camera.fx, self.camera.fy)).astype(np.float32)
+        across = pixels * depth / min(self.camera.fx, self.camera.fy)
+        return np.asarray(across, dtype=np.float32)
 
 
 def _slope(values: Depth, axis: int) -> Depth:
