@@ -49,13 +49,14 @@ def arguments(files, *more, scale=5000):
 def test_meshes_numbers_and_positions_are_written(files, capsys):
     import trimesh
 
-    more = ("--images", files / "color", "--positions", "--json")
+    more = ("--images", files / "color", "--positions", files / "positions.csv", "--json")
     assert main(arguments(files, *more)) == 0
     printed = json.loads(capsys.readouterr().out)
     folder = files / "results" / "surfaces"
     names = {path.name for path in folder.iterdir()}
     meshes = {f"object_{k}.{suffix}" for k in (0, 1) for suffix in ("ply", "glb")}
-    assert names == meshes | {"surfaces.json", "positions.csv", "config.toml", "manifest.json"}
+    assert names == meshes | {"surfaces.json", "config.toml", "manifest.json"}
+    assert len((files / "positions.csv").read_text().splitlines()) == 1 + 12
     table = json.loads((folder / "surfaces.json").read_text())
     assert [one["id"] for one in table["objects"]] == [0, 1]
     assert table["objects"] == printed["objects"]

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from dqslam._files import refuse_inputs
 from dqslam.cli.options import FrameRate, FrameTimesFile, given_frame_times
 from dqslam.cli.output import Json, Output, Quiet
 from dqslam.cli.settings import CONFIG, ConfigFile, save_settings
@@ -51,13 +52,13 @@ def shape(
         ),
     ] = None,
     positions: Annotated[
-        bool,
+        Path | None,
         typer.Option(
-            "--positions",
-            help="Also write positions.csv, the measured centers of objects in the camera frame, "
-            "for `dqslam run --positions`.",
+            metavar="FILE",
+            help="CSV to write, of measured centers of objects in the camera frame, for `dqslam "
+            "run --positions`.",
         ),
-    ] = False,
+    ] = None,
     voxel: Annotated[
         float | None,
         typer.Option(
@@ -102,6 +103,8 @@ def shape(
     output = Output(quiet=quiet, as_json=json)
     out = directory / files.FOLDER if out is None else out
     inputs = (depth, images, frame_times, config)
+    if positions is not None:
+        refuse_inputs(positions, (*inputs, *_files_in(directory), *_files_in(depth)))
     check_output_set(out, WRITTEN_BY, inputs=(directory / "map.json", *inputs))
     options = surface.SurfaceOptions(
         voxel=voxel, margin=margin, depth_noise=depth_noise, closed=closed
@@ -127,16 +130,17 @@ def shape(
                 depth_scale=depth_scale,
                 progress=progress,
             )
-        if positions:
+        if positions is not None:
             with output.share("positions") as progress:
                 measured = surface.relative_positions(
                     results, found_depth, found, progress=progress
                 )
-            surface.write_positions(folder / "positions.csv", results, measured)
         with output.share("writing") as progress:
             surface.write_surfaces(folder, found, progress)
         save_settings(context, folder / CONFIG)
     belongs_to(directory, out)
+    if positions is not None and measured is not None:
+        surface.write_positions(positions, results, measured)
     output.table(_table(found))
     for number, why in found.left_out.items():
         output.warn(f"object {number} has no surface: {why}")
@@ -149,12 +153,16 @@ def shape(
                 "its volume and extents rest on the map elsewhere"
             )
     if measured is not None:
-        output.line(f"{len(measured)} positions of objects from {len(results.boxes or ())} boxes")
+        output.line(f"wrote {positions}: {len(measured)} positions of objects")
     output.line(f"wrote {out}")
     document = files.described(found)
     if measured is not None:
         document["positions"] = len(measured)
     output.document(document | {"written": str(out)})
+
+
+def _files_in(folder: Path) -> list[Path]:
+    return [one for one in folder.iterdir() if one.is_file()] if folder.is_dir() else []
 
 
 def _table(found: "Surfaces") -> "Table":
