@@ -21,6 +21,7 @@ if TYPE_CHECKING:  # the one list of public names, a line each: lazy_exports rea
     from dqslam import plot as plot
     from dqslam import simulation as simulation
     from dqslam import studies as studies
+    from dqslam import surface as surface
     from dqslam import view as view
     from dqslam._core import Backend as Backend
     from dqslam._core import Camera as Camera
@@ -123,6 +124,11 @@ if TYPE_CHECKING:  # the one list of public names, a line each: lazy_exports rea
     from dqslam.simulation import load_scenario as load_scenario
     from dqslam.simulation import simulate as simulate
     from dqslam.studies.paper import run_paper as run_paper
+    from dqslam.surface import DepthImages as DepthImages
+    from dqslam.surface import Surface as Surface
+    from dqslam.surface import SurfaceOptions as SurfaceOptions
+    from dqslam.surface import Surfaces as Surfaces
+    from dqslam.surface import fuse_surfaces as fuse_surfaces
     from dqslam.uncertainty import Bound as Bound
     from dqslam.uncertainty import Marginals as Marginals
     from dqslam.uncertainty import UnderConstrained as UnderConstrained

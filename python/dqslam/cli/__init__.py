@@ -30,6 +30,7 @@ from dqslam.cli.merge import merge
 from dqslam.cli.paper import paper
 from dqslam.cli.plot import plot
 from dqslam.cli.run import run
+from dqslam.cli.shape import shape
 from dqslam.cli.simulate import simulate
 from dqslam.cli.sweep import sweep
 from dqslam.cli.view import view
@@ -38,7 +39,7 @@ from dqslam.cli.worlds import worlds
 # The commands in the order of the help, by the title of their panel.
 COMMANDS: dict[str, tuple[Callable[..., None], ...]] = {
     "Start here": (demo, paper, simulate),
-    "Your recording": (detect, inspect, convert, run, evaluate),
+    "Your recording": (detect, inspect, convert, run, evaluate, shape),
     "Places": (locate, changes, align, merge),
     "Look": (plot, view),
     "Study": (sweep, worlds, ablation, degeneracy),

@@ -18,6 +18,7 @@ from dqslam.io.frames import FrameTimes as FrameTimes
 from dqslam.io.frames import frame_rate as frame_rate
 from dqslam.io.frames import read_frame_times as read_frame_times
 from dqslam.io.images import find_images as find_images
+from dqslam.io.images import timed_images as timed_images
 from dqslam.io.measurements import read_absolute as read_absolute
 from dqslam.io.measurements import read_closures as read_closures
 from dqslam.io.measurements import read_positions as read_positions

@@ -30,11 +30,7 @@ def find_images(
     - its place in the order of names, if there are as many images as poses.
     """
     folder = Path(folder)
-    if not folder.is_dir():
-        raise FileError(folder, "no such folder of images")
-    files = sorted(one for one in folder.iterdir() if one.suffix.lower() in SUFFIXES)
-    if not files:
-        raise FileError(folder, f"holds no images ({', '.join(SUFFIXES)})")
+    files = _images_in(folder)
     if frames is not None:
         found = _nearest(timestamps, *_framed(files, frames))
         if not found:
@@ -46,7 +42,57 @@ def find_images(
         return found
     if len(files) == len(timestamps):
         return dict(enumerate(files))
-    raise FileError(
+    raise _unknown_times(folder, files, timestamps)
+
+
+def timed_images(
+    folder: str | Path, timestamps: Floats, frames: FrameTimes | None = None
+) -> tuple[list[Path], Floats]:
+    """Return all image files of a folder in the order of time, and their times (k,), seconds.
+
+    Times come from where ``find_images`` takes them; an image is not held to the time of a pose.
+    Images without a time in ``frames`` are left out.
+
+    Raises
+    ------
+    FileError
+        If there are no images, nothing tells their times, or two have the same.
+    """
+    folder = Path(folder)
+    files = _images_in(folder)
+    if frames is not None:
+        files, times = _framed(files, frames)
+        if not files:
+            raise FileError(folder, f"no image has a time, by {frames.source}")
+    else:
+        found = _times(files, timestamps)
+        near = () if found is None else _nearest(timestamps, files, found)
+        if found is None or not near:
+            if len(files) != len(timestamps):
+                raise _unknown_times(folder, files, timestamps)
+            found = timestamps
+        times = found
+    order = np.argsort(times, kind="stable")
+    files, times = [files[row] for row in order], times[order]
+    same = np.flatnonzero(np.diff(times) == 0.0)
+    if same.size:
+        row = int(same[0])
+        message = f"is of the same time as {files[row].name}: {float(times[row])!r} s"
+        raise FileError(files[row + 1], message)
+    return files, times
+
+
+def _images_in(folder: Path) -> list[Path]:
+    if not folder.is_dir():
+        raise FileError(folder, "no such folder of images")
+    files = sorted(one for one in folder.iterdir() if one.suffix.lower() in SUFFIXES)
+    if not files:
+        raise FileError(folder, f"holds no images ({', '.join(SUFFIXES)})")
+    return files
+
+
+def _unknown_times(folder: Path, files: list[Path], timestamps: Floats) -> FileError:
+    return FileError(
         folder,
         f"{len(files)} images (the first is {files[0].name}), {len(timestamps)} poses from "
         f"{timestamps[0]:.6f} s: the names are not times of poses, so the times of frames are "
