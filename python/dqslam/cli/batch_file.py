@@ -59,25 +59,25 @@ def load_batch(path: str | Path) -> Batch:
         mistakes += error.errors
     defaults = _table(file.content.get("defaults"))
     entries = file.content.get("recordings")
-    tasks: dict[str, Task] = {}
+    found: dict[str, dict[str, Any]] = {}
     for number, entry in enumerate(entries if isinstance(entries, list) else []):
         location = ("recordings", number)
         for name, place in _places(file, _table(entry), location, mistakes):
-            if name in tasks:
+            if name in found:
                 mistakes.append(file.error(location, f"another recording has the name {name}, too"))
             settings = _settings(file, place, defaults, _table(entry))
             for missing in [one for one in _IN_BAG if one not in settings]:
                 mistakes.append(
                     file.error(location, f"{missing} is missing, here and in [defaults]")
                 )
-            tasks[name] = Task(name, settings)
+            found[name] = settings
     if entries == []:
         mistakes.append(file.error(("recordings",), "recordings: there is none"))
     if mistakes:  # a recording of a glob repeats the mistakes of its entry
         raise FileErrors(list({str(one): one for one in mistakes}.values()))
     align, merge = file.content.get("align"), file.content.get("merge")
     return Batch(
-        tuple(tasks.values()),
+        tuple(Task(name, settings) for name, settings in found.items()),
         None if align is None else AlignOptions(**align),
         None if merge is None else MergeOptions(**merge),
     )
