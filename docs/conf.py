@@ -45,7 +45,7 @@ nitpick_ignore_regex = [
     ),
     ("py:.*", r"(Any|ArrayLike|NDArray|ndarray|float64|int64|bool|Align|Ids|TypeAliasForwardRef)"),
     ("py:.*", r"dict\[.*|dqslam\.studies\.paper\.methods\.Settings|dqslam\.io\.results\.save\..*"),
-    ("py:.*", r"dqslam\.(view\.scene|studies\.sweep|plot)\..*"),
+    ("py:.*", r"dqslam\.(view\.scene|studies\.(sweep|batch)|plot)\..*"),
     ("py:.*", r"dqslam\.association\.scene_map\.SceneMap"),  # the inside of an association
     ("py:.*", r"dqslam\.places\.(sensor\.Sensor|locate_upright\.Upright)"),  # that of a map
 ]

@@ -70,7 +70,9 @@ def batch(
         if not is_copy:
             write_text(folder / COPY, read_text(file))
         save_settings(context, folder / CONFIG)
-    output.document({"recordings": [asdict(row) for row in done.rows], **asdict(done.combined)})
+    rows, combined = [asdict(row) for row in done.rows], asdict(done.combined)
+    merged = done.combined.merged and str(done.combined.merged)
+    output.document({"recordings": rows, **combined, "merged": merged})
     _show(output, done)
     if done.with_status("failed"):
         raise typer.Exit(FAILED)
@@ -99,7 +101,7 @@ def _table(rows: "tuple[Row, ...]") -> "Table":
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
-    shown = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    shown = Table(box=SIMPLE_HEAD, padding=0)
     shown.add_column("recording", overflow="fold")
     shown.add_column("status", no_wrap=True)
     has_truth = any(row.ate_m is not None for row in rows)
