@@ -17,7 +17,7 @@ version = release = re.search(
 )[1]
 
 extensions = [
-    "myst_parser",
+    "myst_nb",  # Markdown too
     "sphinx.ext.autodoc",
     "sphinx.ext.napoleon",
     "sphinx_copybutton",
@@ -35,6 +35,12 @@ generated = DOCS / "_generated"
 # Markdown as a forge shows it: $ for mathematics, headings as targets of links.
 myst_enable_extensions = ["dollarmath", "fieldlist", "attrs_inline"]
 myst_heading_anchors = 3
+
+# Notebooks have no stored output: the build executes them, and an error ends it.
+nb_execution_mode = "force"
+nb_execution_timeout = 300
+nb_execution_raise_on_error = True
+nb_merge_streams = True
 
 # Every name in a signature is a link or is listed here: what other projects document.
 nitpicky = True
