@@ -54,10 +54,9 @@ class DqslamNode(Node):
             self.create_subscription(Odometry, "odom", self.session.take_odometry, sensor)
         detections = self.session.take_detections
         self.create_subscription(Detection2DArray, "detections", detections, sensor)
-        for name, done in (("save", "wrote"), ("load", "looking for the camera in")):
-            self._serve(name, lambda name=name: getattr(self.session, name)(self._value("folder")),
-                        f"{done} {self._value('folder')}")  # fmt: skip
-        self._serve("relocalize", self.session.relocalize, "looking for the camera in the map")
+        self._serve("save", lambda: self._in_folder(self.session.save, "wrote"))
+        self._serve("load", lambda: self._in_folder(self.session.load, "looking for the camera in"))
+        self._serve("relocalize", self._relocalize)
         self.create_timer(0.05, self.on_timer)
 
     def _value(self, name: str):
@@ -76,18 +75,26 @@ class DqslamNode(Node):
         except (TransformException, ValueError) as error:
             self.get_logger().warning(str(error), throttle_duration_sec=5.0)
 
-    def _serve(self, name: str, call: Callable[[], None], done: str) -> None:
-        """Offer a call of the session as a service, whose message says what was done or why not."""
+    def _serve(self, name: str, call: Callable[[], str]) -> None:
+        """Offer a call as a service, whose message says what was done or why it was not."""
 
         def answer(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
             try:
-                call()
-                response.success, response.message = True, done
+                response.success, response.message = True, call()
             except (OSError, ValueError) as error:
                 response.success, response.message = False, str(error)
             return response
 
         self.create_service(Trigger, name, answer)
+
+    def _in_folder(self, call: Callable[[str], None], done: str) -> str:
+        folder = self._value("folder")
+        call(folder)
+        return f"{done} {folder}"
+
+    def _relocalize(self) -> str:
+        self.session.relocalize()
+        return "looking for the camera in the map"
 
     def _ask_tf(self) -> None:
         """Take the odometry at the times of images from tf, as far as it is there."""

@@ -266,7 +266,7 @@ class Session:
         """
         if self.slam is None:
             raise ValueError("there is no map to be located in: no image was a step")
-        self._is_lost = True
+        self._map_to_load, self._is_lost = None, True
 
 
 class _NotLocatedError(Exception):
