@@ -17,7 +17,7 @@ version = release = re.search(
 )[1]
 
 extensions = [
-    "myst_parser",
+    "myst_nb",  # Markdown too
     "sphinx.ext.autodoc",
     "sphinx.ext.napoleon",
     "sphinx_copybutton",
@@ -36,6 +36,12 @@ generated = DOCS / "_generated"
 myst_enable_extensions = ["dollarmath", "fieldlist", "attrs_inline"]
 myst_heading_anchors = 3
 
+# Notebooks have no stored output: the build executes them, and an error ends it.
+nb_execution_mode = "force"
+nb_execution_timeout = 300
+nb_execution_raise_on_error = True
+nb_merge_streams = True
+
 # Every name in a signature is a link or is listed here: what other projects document.
 nitpicky = True
 nitpick_ignore_regex = [
@@ -45,7 +51,7 @@ nitpick_ignore_regex = [
     ),
     ("py:.*", r"(Any|ArrayLike|NDArray|ndarray|float64|int64|bool|Align|Ids|TypeAliasForwardRef)"),
     ("py:.*", r"dict\[.*|dqslam\.studies\.paper\.methods\.Settings|dqslam\.io\.results\.save\..*"),
-    ("py:.*", r"dqslam\.(view\.scene|studies\.sweep|plot)\..*"),
+    ("py:.*", r"dqslam\.(view\.scene|studies\.(sweep|batch)|plot)\..*"),
     ("py:.*", r"dqslam\.association\.scene_map\.SceneMap"),  # the inside of an association
     ("py:.*", r"dqslam\.places\.(sensor\.Sensor|locate_upright\.Upright)"),  # that of a map
 ]

@@ -1,5 +1,6 @@
 """The pages of docs/: what they show is executed, what they name exists, and Sphinx builds them."""
 
+import json
 import os
 import re
 import shutil
@@ -18,9 +19,10 @@ from pages import PAGES, ROOT, blocks, commands, execute, execute_block
 
 READ = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *PAGES]
 EXECUTED = [page for page in PAGES if blocks(page, "bash", "python")]
+NOTEBOOKS = sorted((ROOT / "docs/notebooks").glob("*.ipynb"))
 EXAMPLES = sorted((ROOT / "examples").glob("plot_*.py"))
-# Without running the gallery, which is tested by itself, and with a small table.
-QUICK = ("plot_gallery=0", "dqslam_paper_trials=2")
+# Without running gallery and notebooks, which are tested by themselves, and with a small table.
+QUICK = ("plot_gallery=0", "dqslam_paper_trials=2", "nb_execution_mode=off")
 
 
 def stem(page):
@@ -133,6 +135,20 @@ def test_example(example, tmp_path, monkeypatch):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("notebook", NOTEBOOKS, ids=stem)
+def test_notebook(notebook, tmp_path):
+    """Its cells run in order; it has no outputs, for the site executes it."""
+    cells = [
+        cell
+        for cell in json.loads(notebook.read_text(encoding="utf-8"))["cells"]
+        if cell["cell_type"] == "code"
+    ]
+    assert not any(cell["outputs"] or cell["execution_count"] for cell in cells)
+    code = "\n".join("".join(cell["source"]) for cell in cells)
+    execute([sys.executable, "-c", code], tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.skipif(find_spec("sphinx_gallery") is None, reason="needs the extra docs")
 def test_the_site_is_built_without_a_warning(tmp_path):
     """On a copy, for the build writes into docs/."""
@@ -148,7 +164,11 @@ def test_the_site_is_built_without_a_warning(tmp_path):
     assert len(re.findall("<math ", (site / "method.html").read_text())) > 20
     assert "this build" in (site / "paper_experiment.html").read_text()
     assert (site / "_images/paper_maps.png").is_file()
+    assert "How sure is it?" in (site / "notebooks/boxes_to_map.html").read_text()
     assert (site / "_generated/source/cpp/dqslam/geometry/blocks.h.html").is_file()
-    for page in site.glob("*.html"):  # nothing is fetched from elsewhere
+    for page in (
+        *site.glob("*.html"),
+        *site.glob("notebooks/*.html"),
+    ):  # nothing is fetched from elsewhere
         fetched = r'<(?:script|img|iframe)[^>]* src="https?://|<link[^>]* href="https?://'
         assert not re.findall(fetched, page.read_text()), page.name

@@ -1,123 +1,28 @@
-"""The logic of the ROS node, fed with the message types of rosbags; rclpy is not needed."""
-
-import sys
-from pathlib import Path
-from types import SimpleNamespace
+"""The logic of the ROS node, fed with messages of a drive; rclpy is not needed."""
 
 import numpy as np
 import pytest
 
 import dqslam as dq
-from orbit import CAMERA, NAMES, make_orbit
+from orbit import NAMES, make_orbit
+from ros_messages import (
+    PACKAGE,
+    ROOT,
+    camera_info,
+    detections,
+    drifting,
+    odometry,
+    ready,
+    robot_path,
+)
 
-ROOT = Path(__file__).resolve().parents[2]
-PACKAGE = ROOT / "ros" / "dqslam_ros"
-sys.path.insert(0, str(PACKAGE))
-
-from dqslam_ros.poses import PoseBuffer, matrix_of, pose_of  # noqa: E402
-from dqslam_ros.session import Session, SessionOptions, boxes_of  # noqa: E402
-
-typesys = pytest.importorskip("rosbags.typesys", reason="rosbags: pip install 'dqslam[rosbag]'")
-STORE = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
-# The camera looks along the robot's x; it is 0.2 m before and 0.5 m above the robot's middle.
-MOUNT = np.array([0.2, 0.0, 0.5, -0.5, 0.5, -0.5, 0.5])
-
-
-def types(name):
-    return STORE.types[name]
-
-
-def header(time, frame=""):
-    stamp = types("builtin_interfaces/msg/Time")
-    whole = int(time)
-    at = stamp(sec=whole, nanosec=round((time - whole) * 1e9))
-    return types("std_msgs/msg/Header")(stamp=at, frame_id=frame)
-
-
-def camera_info():
-    region = types("sensor_msgs/msg/RegionOfInterest")(0, 0, 0, 0, False)
-    k = [CAMERA["fx"], 0, CAMERA["cx"], 0, CAMERA["fy"], CAMERA["cy"], 0, 0, 1]
-    return types("sensor_msgs/msg/CameraInfo")(
-        header=header(0, "camera"),
-        height=CAMERA["height"],
-        width=CAMERA["width"],
-        distortion_model="plumb_bob",
-        d=np.zeros(5),
-        k=np.array(k, dtype=float),
-        r=np.eye(3).ravel(),
-        p=np.zeros(12),
-        binning_x=0,
-        binning_y=0,
-        roi=region,
-    )
-
-
-def odometry(time, pose):
-    x, y, z, qx, qy, qz, qw = map(float, pose)
-    place = types("geometry_msgs/msg/Pose")(
-        types("geometry_msgs/msg/Point")(x, y, z),
-        types("geometry_msgs/msg/Quaternion")(qx, qy, qz, qw),
-    )
-    zero = types("geometry_msgs/msg/Vector3")(0.0, 0.0, 0.0)
-    twist = types("geometry_msgs/msg/Twist")(zero, zero)
-    return types("nav_msgs/msg/Odometry")(
-        header(time, "odom"),
-        "base_link",
-        types("geometry_msgs/msg/PoseWithCovariance")(place, np.zeros(36)),
-        types("geometry_msgs/msg/TwistWithCovariance")(twist, np.zeros(36)),
-    )
-
-
-def detection(box, name, *, older, score=0.9):
-    """A detection of vision_msgs 4, or of an earlier version, which has other fields."""
-    u, v = (box[0] + box[2]) / 2, (box[1] + box[3]) / 2
-    place = SimpleNamespace(x=u, y=v)
-    center = SimpleNamespace(x=u, y=v, theta=0.0)
-    result = SimpleNamespace(id=name, score=score)
-    if not older:
-        center = SimpleNamespace(position=place, theta=0.0)
-        result = SimpleNamespace(hypothesis=SimpleNamespace(class_id=name, score=score))
-    bbox = SimpleNamespace(center=center, size_x=box[2] - box[0], size_y=box[3] - box[1])
-    return SimpleNamespace(bbox=bbox, results=[result], id="", tracking_id="")
-
-
-def detections(orbit, pose, *, older=False):
-    found = [
-        detection(box, NAMES[name], older=older)
-        for (at, name), box in orbit.boxes.items()
-        if at == pose
-    ]
-    return SimpleNamespace(header=header(orbit.times[pose]), detections=found)
-
-
-def robot_path(orbit):
-    """Return odom_from_base of each pose: odometry begins where the camera's world has it."""
-    mount = np.linalg.inv(matrix_of(MOUNT))
-    return [pose_of(matrix_of(pose) @ mount) for pose in orbit.poses]
-
-
-def drifting(orbit, seed=0):
-    """Return odometry whose steps have noise of 4 mm and 4 mrad."""
-    random = np.random.default_rng(seed)
-    true = [matrix_of(pose) for pose in robot_path(orbit)]
-    path = [true[0]]
-    for before, after in zip(true[:-1], true[1:], strict=True):
-        noise = np.concatenate([random.normal(0, 0.004, 3), random.normal(0, 0.002, 3), [1.0]])
-        noise[3:] /= np.linalg.norm(noise[3:])
-        path.append(path[-1] @ np.linalg.inv(before) @ after @ matrix_of(noise))
-    return [pose_of(one) for one in path]
+from dqslam_ros.poses import PoseBuffer, matrix_of, pose_of  # isort: skip
+from dqslam_ros.session import Session  # isort: skip
 
 
 @pytest.fixture(scope="module")
 def orbit():
     return make_orbit(count=80, noise_px=0.5)
-
-
-def ready(**options):
-    session = Session(SessionOptions(**options))
-    session.take_camera_info(camera_info())
-    session.set_mount(MOUNT)
-    return session
 
 
 @pytest.mark.parametrize("older", [False, True])
@@ -185,22 +90,6 @@ def test_odometry_between_two_messages():
     assert buffer.at(1.5) is None  # forgotten
 
 
-def test_boxes_of_a_message():
-    camera = dq.Camera(500, 510, 321, 239, 640, 480)
-    message = SimpleNamespace(
-        detections=[
-            detection([10, 20, 110, 220], "cup", older=False),
-            detection([-0.5, 20, 60, 220], "cut", older=False),
-            detection([10, 20, 110, 220], "weak", older=False, score=0.2),
-        ]
-    )
-    boxes = boxes_of(message, camera, SessionOptions())
-    np.testing.assert_allclose(boxes.box, [[10, 20, 110, 220], [-0.5, 20, 60, 220]])
-    assert list(boxes.class_name) == ["cup", "cut"]
-    np.testing.assert_array_equal(boxes.truncated, [[0, 0, 0, 0], [1, 0, 0, 0]])
-    np.testing.assert_array_equal(boxes.object_id, [-1, -1])
-
-
 def test_nothing_happens_before_camera_and_mount_are_known(orbit):
     session = Session()
     session.take_detections(detections(orbit, 0))
@@ -208,14 +97,17 @@ def test_nothing_happens_before_camera_and_mount_are_known(orbit):
     assert session.map_from_odom() is None
     with pytest.raises(ValueError, match="there is nothing to save yet"):
         session.save("anywhere")
-    fisheye = camera_info()
-    object.__setattr__(fisheye, "distortion_model", "equidistant")
-    with pytest.raises(ValueError, match="no lens model 'equidistant' here yet"):
-        session.take_camera_info(fisheye)
+    with pytest.raises(ValueError, match="no map to be located in"):
+        session.relocalize()
+    unknown = camera_info()
+    object.__setattr__(unknown, "distortion_model", "of my own")
+    with pytest.raises(ValueError, match="camera_info: .*of my own"):
+        session.take_camera_info(unknown)
 
 
 def test_the_package_is_of_this_version():
     import re
+    import sys
     import xml.etree.ElementTree as ElementTree
 
     cmake = (ROOT / "CMakeLists.txt").read_text()
@@ -226,5 +118,5 @@ def test_the_package_is_of_this_version():
     needed = {one.text for one in package.findall("exec_depend")}
     source = (PACKAGE / "dqslam_ros" / "node.py").read_text()
     used = set(re.findall(r"^from (\w+)(?:\.\w+)? import", source, flags=re.MULTILINE))
-    ours = {"__future__", "dqslam", "dqslam_ros", "scipy", "rclpy"}
+    ours = {*sys.stdlib_module_names, "dqslam", "dqslam_ros", "rclpy"}
     assert used - ours <= needed

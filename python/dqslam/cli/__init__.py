@@ -18,6 +18,7 @@ from dqslam._repr import printable
 from dqslam._version import version
 from dqslam.cli.ablation import ablation
 from dqslam.cli.align import align
+from dqslam.cli.batch import batch
 from dqslam.cli.changes import changes
 from dqslam.cli.convert import convert
 from dqslam.cli.degeneracy import degeneracy
@@ -39,7 +40,7 @@ from dqslam.cli.worlds import worlds
 # The commands in the order of the help, by the title of their panel.
 COMMANDS: dict[str, tuple[Callable[..., None], ...]] = {
     "Start here": (demo, paper, simulate),
-    "Your recording": (detect, inspect, convert, run, evaluate, shape),
+    "Your recording": (detect, inspect, convert, run, batch, evaluate, shape),
     "Places": (locate, changes, align, merge),
     "Look": (plot, view),
     "Study": (sweep, worlds, ablation, degeneracy),
@@ -50,6 +51,7 @@ EXIT_CODES = {
     2: "bad input: options, files, or a problem that they do not determine",
     3: "done, but the result of `run` is doubtful, `inspect --strict` has found a mistake, or "
     "maps do not say whether they are of one place, or how they lie to each other",
+    4: "done, but a recording of `batch` has failed",
     130: "stopped by Ctrl-C",
     141: "stopped, because the reader of its output has gone",
 }

@@ -34,8 +34,9 @@ BackendName = Annotated[
     Literal["serial", "processes", "loky", "dask", "ray"] | None,
     typer.Option(
         "--backend",
-        help="Where trials run: this process, other processes (Python's or joblib's loky), or a "
-        "cluster. Default: serial for one job, else loky if joblib is installed, else processes.",
+        help="Where trials or recordings run: this process, other processes (Python's or "
+        "joblib's loky), or a cluster. Default: serial for one job, else loky if joblib is "
+        "installed, else processes.",
     ),
 ]
 Scheduler = Annotated[

@@ -92,14 +92,14 @@ class Output:
         self.line(f"wrote {path}")
 
     @contextmanager
-    def trials(self, total: int) -> Iterator[Callable[[int, int], None]]:
+    def trials(self, total: int, what: str = "trials") -> Iterator[Callable[[int, int], None]]:
         """Show a bar of finished trials with the time left, and give the function that updates it.
 
         It is called with (trials done, trials).
         """
         from rich.progress import BarColumn, MofNCompleteColumn, TimeRemainingColumn
 
-        columns = ("trials", BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), "left")
+        columns = (what, BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), "left")
         with self._bar(columns, total) as update:
             yield lambda done, _: update(done)
 

@@ -1,7 +1,7 @@
 """``dqslam run``: a map and a trajectory from the files of a recording."""
 
 from collections.abc import Callable
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
@@ -155,7 +155,11 @@ def run(
     ] = False,
     mcap: Annotated[
         Path | None,
-        typer.Option(metavar="FILE.mcap", help="Also write the result as MCAP, for Foxglove."),
+        typer.Option(
+            metavar="FILE.mcap",
+            help="Also write the result as MCAP, for Foxglove; with --online, step by step while "
+            "it runs.",
+        ),
     ] = None,
     force: Annotated[
         bool,
@@ -175,6 +179,7 @@ def run(
     from dqslam.assumptions import load_placements, load_size_priors
     from dqslam.pipeline import RunFilesOptions, run_files
     from dqslam.pipeline.files import WRITTEN_BY
+    from dqslam.view import build_scene, record_session, write_mcap
 
     inputs = (
         *(*files.files, groundtruth, size_priors, odometry_covariance),
@@ -213,29 +218,38 @@ def run(
         if find_spec("foxglove") is None:
             raise ValueError("MCAP needs foxglove-sdk: pip install 'dqslam[mcap]'")
         refuse_inputs(mcap, inputs)
+        if online and out.resolve() in mcap.resolve().parents:
+            raise ValueError(
+                f"--mcap: {mcap} grows while the session runs, and cannot be in the folder of the "
+                "results, which are written at its end"
+            )
     # A session shows a line with its state, a batch a bar with the share that is done.
     shown: AbstractContextManager[Callable[[Any], None]] = (
         output.live("loading") if online else output.share("estimating")
     )
-    with shown as show:
+    with shown as show, ExitStack() as stack:
+        recorder = None
+        if mcap is not None and online:
+            recorder = stack.enter_context(record_session(mcap))
         result = run_files(
             files.camera,
             files.odometry,
             files.detections,
-            options,
+            replace(options, watch=recorder),
             online=online,
             groundtruth=groundtruth,
             out=out,
             beside={CONFIG: settings_text(context)},
             progress=lambda share, text: show(text if online else share),
         )
+        if recorder is not None:
+            recorder.finish(build_scene(io.load_results(out)))
     output.document(result.report)
     show_report(output, result.report)
     output.line(f"wrote {out}")
     if mcap is not None:
-        from dqslam.view import build_scene, write_mcap
-
-        write_mcap(build_scene(io.load_results(out)), mcap)
+        if not online:
+            write_mcap(build_scene(io.load_results(out)), mcap)
         output.line(f"wrote {mcap}")
     if result.report["doubts"]:
         raise typer.Exit(DOUBTFUL)

@@ -94,17 +94,32 @@ def settings_model(command: Any) -> type[BaseModel]:
     """Make the model of the settings that a command can read from a file."""
     from pydantic import ConfigDict, Field, create_model
 
-    annotations = get_type_hints(inspect.unwrap(command.callback), include_extras=True)
-    keys: dict[str, Any] = {
-        key: _setting_type(annotations[name]) for key, name in setting_names(command).items()
-    }
-    keys |= {"command": Literal[command.name], "dqslam_version": str}
+    keys = setting_types(command) | {"command": Literal[command.name], "dqslam_version": str}
     # Fields have aliases, because not every name is allowed for a field of a model.
     fields: dict[str, Any] = {
         f"setting_{key}": (type_ | None, Field(None, alias=key)) for key, type_ in keys.items()
     }
     config = ConfigDict(extra="forbid", strict=True)
     return create_model("Settings", __config__=config, **fields)
+
+
+def setting_types(command: Any) -> dict[str, Any]:
+    """Return the types that the options of a command have in a file, by their names in it."""
+    return {key: _setting_type(one) for key, one in _annotations(command).items()}
+
+
+def path_settings(command: Any) -> tuple[str, ...]:
+    """Return the names, in a file, of the options of a command that are paths."""
+    return tuple(key for key, one in _annotations(command).items() if _is_path(one))
+
+
+def _annotations(command: Any) -> dict[str, Any]:
+    found = get_type_hints(inspect.unwrap(command.callback), include_extras=True)
+    return {key: found[name] for key, name in setting_names(command).items()}
+
+
+def _is_path(annotation: Any) -> bool:
+    return annotation is Path or any(_is_path(one) for one in get_args(annotation))
 
 
 def _setting_type(annotation: Any) -> Any:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from dqslam import _core
 from dqslam.assumptions import OdometryNoise
 from dqslam.io.detections import DetectionTable
+from dqslam.io.detections.table import cut_to_image
 from dqslam.io.extras import Extras
 from dqslam.io.files import FileError
 from dqslam.io.nearest import nearest_pose
@@ -109,8 +110,8 @@ def load_recording(
         before the first and after the last pose are left out. If not, a box belongs to the nearest
         pose.
     examine
-        Called with camera, trajectory and boxes before they become a recording; what it raises
-        ends that.
+        Called with camera, trajectory and the uncut boxes of at least the least score, before they
+        become a recording; what it raises ends that.
 
     Raises
     ------
@@ -145,11 +146,16 @@ def load_recording(
     if len(pose_times) < 2:
         raise FileError(odometry, "one pose only: nothing moves")
     size = (lens.width, lens.height)
-    table = read_boxes_file(detections, size, how, own, trajectory=trajectory, min_score=min_score)
+    # Uncut, because boxes that leave the image tell that they are of another one.
+    table = read_boxes_file(
+        detections, size, how, own, trajectory=trajectory, cut=False, min_score=min_score
+    )
+    if examine is not None:
+        taking_part = table.score >= min_score
+        examine(lens, trajectory, table.select(taking_part) if taking_part.any() else table)
+    table = cut_to_image(table, *size, notes=own, min_score=min_score)
     if notes is None:
         own.warn()
-    if examine is not None:
-        examine(lens, trajectory, table)
     object_id = object_ids(table, ids)
     covariance = (odometry_noise or OdometryNoise()).covariance(len(path) - 1)
     if odometry_covariance is not None:

@@ -32,14 +32,24 @@ def widened(recording: Recording) -> tuple[Recording, Floats]:
     camera, boxes = recording.camera, recording.detections.box
     if not camera.has_distortion:
         return recording, np.zeros(2)
+    # Beyond the range of the lens there is no border; then the boxes say how far the image goes.
+    wide, offset = wide_camera(camera, boxes.reshape(-1, 2))
+    detections = replace(recording.detections, box=boxes + np.tile(offset, 2))
+    return replace(recording, camera=wide, detections=detections), offset
+
+
+def wide_camera(camera: _core.Camera, points: Floats) -> tuple[_core.Camera, Floats]:
+    """Return a camera whose image has all that a lens shows, and points (n, 2) of the pinhole.
+
+    Its image begins at -0.5. What was at a point of the pinhole's image is moved by the offset
+    (2,), which is returned, too.
+    """
     size = np.array([camera.width, camera.height])
     share = np.linspace(0.0, 1.0, _SIDE_POINTS)
     sides = [np.column_stack([share, end]) for end in (0 * share, 0 * share + 1)]
     border = np.concatenate([*sides, *(side[:, ::-1] for side in sides)]) * size - 0.5
-    # Beyond the range of the lens there is no border; then the boxes say how far the image goes.
-    corners = boxes.reshape(-1, 2)
-    points = np.concatenate([ideal_pixels(camera, border), corners, [[-0.5, -0.5], size - 0.5]])
-    low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
+    shown = np.concatenate([ideal_pixels(camera, border), points, [[-0.5, -0.5], size - 0.5]])
+    low, high = np.nanmin(shown, axis=0), np.nanmax(shown, axis=0)
     offset = np.ceil(-0.5 - low)
     wide = LensCamera(
         camera.fx,
@@ -50,8 +60,7 @@ def widened(recording: Recording) -> tuple[Recording, Floats]:
         lens=lens_of(camera),
         robot_from_camera=camera.robot_from_camera,
     )
-    detections = replace(recording.detections, box=boxes + np.tile(offset, 2))
-    return replace(recording, camera=wide, detections=detections), offset
+    return wide, offset
 
 
 def exact_boxes(

@@ -37,6 +37,8 @@ def estimate_online(
     step_ms = []
     for frame in replay(slam, recording):
         step_ms.append(frame.milliseconds)
+        if options.watch is not None:
+            options.watch(slam, frame.step)
         progress(len(slam) / len(recording.timestamps), _describe_step(slam, frame))
     live_poses = slam.poses
     summary = slam.polish().result().summary

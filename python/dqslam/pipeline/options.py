@@ -18,9 +18,12 @@ from dqslam.assumptions import (
 )
 from dqslam.io import Extras, ReadOptions
 from dqslam.io.recording import Ids
+from dqslam.online import OnlineSlam, Step
 
 Progress = Callable[[float, str], None]
 """Called with the share of the work that is done, 0 to 1, and a line on the step of a session."""
+Watch = Callable[[OnlineSlam, Step], None]
+"""Called with a session and the step that it has just taken."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,6 +55,8 @@ class RunOptions:
     """Share of the boxes, at least 0 and below 1, that the map is tested on instead."""
     seed: int = 0
     """Seed of the random choice of these boxes."""
+    watch: Watch | None = None
+    """Called after each step of a session; if the calibration is estimated, in each replay."""
 
     def solve_options(self) -> _core.SolveOptions:
         """Return the solver's options: its loss forgives boxes that show something else."""

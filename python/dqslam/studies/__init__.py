@@ -4,6 +4,7 @@ TYPE_CHECKING = False
 
 if TYPE_CHECKING:  # imported when they are asked for, see the package's own list
     from dqslam.studies import ablation as ablation
+    from dqslam.studies import batch as batch
     from dqslam.studies import degeneracy as degeneracy
     from dqslam.studies import paper as paper
     from dqslam.studies import pool as pool

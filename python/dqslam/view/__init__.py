@@ -9,3 +9,5 @@ from dqslam.view.scene import Scene as Scene
 from dqslam.view.scene import SceneObject as SceneObject
 from dqslam.view.scene import build_scene as build_scene
 from dqslam.view.scene import rgb as rgb
+from dqslam.view.session import SessionRecorder as SessionRecorder
+from dqslam.view.session import record_session as record_session

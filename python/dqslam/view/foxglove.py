@@ -43,12 +43,12 @@ def write_mcap(
     ValueError
         If a time is before 1970 or after 2106, which the schemas have no place for.
     """
-    foxglove = _sdk()
-    _check_times(scene)
+    foxglove = foxglove_sdk()
+    check_times(scene.timestamps)
     with whole_file(path) as temporary:
         context = foxglove.Context()
         with foxglove.open_mcap(temporary, allow_overwrite=True, context=context):
-            channels = _Channels(context)
+            channels = Channels(context)
             channels.log_world(scene)
             for frame in range(len(scene.timestamps)):
                 channels.log_frame(scene, frame)
@@ -62,11 +62,11 @@ def serve_foxglove(scene: Scene, host: str, port: int) -> Iterator[tuple[str, Ca
     Gives the address, and a function that plays the recording once in real time; the map is
     repeated every second, for those who join.
     """
-    foxglove = _sdk()
-    _check_times(scene)
+    foxglove = foxglove_sdk()
+    check_times(scene.timestamps)
     context = foxglove.Context()
     server = foxglove.start_server(name=scene.title, host=host, port=port, context=context)
-    channels = _Channels(context)
+    channels = Channels(context)
 
     def play() -> None:
         shown, start = -np.inf, time.monotonic()
@@ -83,7 +83,8 @@ def serve_foxglove(scene: Scene, host: str, port: int) -> Iterator[tuple[str, Ca
         server.stop()
 
 
-def _sdk() -> Any:
+def foxglove_sdk() -> Any:
+    """Return the package of Foxglove, or raise a RuntimeError that names the extra."""
     try:
         import foxglove
     except ModuleNotFoundError:
@@ -91,16 +92,17 @@ def _sdk() -> Any:
     return foxglove
 
 
-def _check_times(scene: Scene) -> None:
-    bad = np.flatnonzero((scene.timestamps < 0.0) | (scene.timestamps > _LATEST_S))
+def check_times(timestamps: Floats) -> None:
+    """Refuse times (n,) [s] that MCAP has no place for."""
+    bad = np.flatnonzero((timestamps < 0.0) | (timestamps > _LATEST_S))
     if bad.size:
-        at = scene.timestamps[bad[0]]
+        at = timestamps[bad[0]]
         raise ValueError(
             f"pose {bad[0]} is at {at:g} s: MCAP has times from 0 to {_LATEST_S:.0f} s"
         )
 
 
-class _Channels:
+class Channels:
     """The topics of one sink, and what is logged to them."""
 
     def __init__(self, context: Context) -> None:

@@ -20,15 +20,26 @@ REGION = ("x_offset", "y_offset", "width", "height")
 def read_camera_info(path: str | Path, *, topic: str | None = None) -> _core.Camera:
     """Read the camera of a bag."""
     for _, message in messages(path, KIND, topic):
-        values: dict[str, Any] = {name: getattr(message, name) for name in FIELDS}
-        values["roi"] = {name: getattr(message.roi, name) for name in REGION}
-        for name in ("k", "d"):
-            numbers = getattr(message, name, None)
-            if numbers is None:
-                numbers = getattr(message, name.upper())
-            values[name] = numbers.tolist()
-        return camera_of_info(Table(path, "", values))
+        return camera_of_message(message, path)
     raise FileError(path, f"holds no {KIND}")
+
+
+def camera_of_message(message: Any, source: str | Path = "camera_info") -> _core.Camera:
+    """Return the camera of the raw image, of a sensor_msgs/CameraInfo of ROS 1 or 2.
+
+    Raises
+    ------
+    FileError
+        If it is not calibrated or its lens model is not known; ``source`` is named in the message.
+    """
+    values: dict[str, Any] = {name: getattr(message, name) for name in FIELDS}
+    values["roi"] = {name: getattr(message.roi, name) for name in REGION}
+    for name in ("k", "d"):
+        numbers = getattr(message, name, None)
+        if numbers is None:
+            numbers = getattr(message, name.upper())
+        values[name] = [float(number) for number in numbers]
+    return camera_of_info(Table(source, "", values))
 
 
 CAMERA_INFO = Format(NAME, LOOKS, looks_like_bag, read_camera_info)

@@ -126,7 +126,7 @@ def checked(
         min_score,
     )
     if cut and width is not None and height is not None:
-        table = _inside(table, width, height, notes, min_score)
+        table = cut_to_image(table, width, height, notes=notes, min_score=min_score)
     _check_times(table)
     return table
 
@@ -155,10 +155,13 @@ def _check_shape(table: DetectionTable, notes: Notes, min_score: float) -> Detec
     return without_bad(table, empty, "empty or inverted", message, notes, min_score)
 
 
-def _inside(
-    table: DetectionTable, width: int, height: int, notes: Notes, min_score: float
+def cut_to_image(
+    table: DetectionTable, width: int, height: int, *, notes: Notes, min_score: float = 0.0
 ) -> DetectionTable:
-    """Cut boxes to the image, which extends half a pixel beyond the centers of its pixels."""
+    """Cut boxes to the image, which extends half a pixel beyond the centers of its pixels.
+
+    A few boxes that are wholly outside are left out, see ``Notes``.
+    """
     box = table.box
     last = np.array([width, height]) - 0.5
     outside = np.any((box[:, 2:] <= -0.5) | (box[:, :2] >= last), axis=1)

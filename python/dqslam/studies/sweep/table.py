@@ -1,16 +1,13 @@
 """Every trial of a sweep as one row: results.csv, and results.parquet if pyarrow is installed."""
 
-import csv
-import io
 import json
 from collections.abc import Sequence
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from dqslam._files import whole_file, write_text
 from dqslam.studies.sweep.file import Sweep
 from dqslam.studies.sweep.trial import METRICS, TrialResult
+from dqslam.studies.tables import write_table
 
 
 def write_results(
@@ -21,12 +18,7 @@ def write_results(
     The columns are: cell, the varied settings by their dotted names, seed, the metrics that any
     trial has, failure. They do not depend on where a trial ran or how long it took.
     """
-    columns = _columns(sweep, keys, results)
-    path = folder / "results.csv"
-    write_text(path, _csv(columns))
-    if find_spec("pyarrow") is None:
-        return [path]
-    return [path, _write_parquet(folder / "results.parquet", columns)]
+    return write_table(folder / "results", _columns(sweep, keys, results))
 
 
 def _columns(
@@ -50,20 +42,3 @@ def _columns(
 def _plain(value: Any) -> Any:
     """Return a value that a cell of a table can hold; lists become JSON."""
     return json.dumps(value) if isinstance(value, list | dict) else value
-
-
-def _csv(columns: dict[str, list[Any]]) -> str:
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(columns)
-    writer.writerows(zip(*columns.values(), strict=True))
-    return text.getvalue()
-
-
-def _write_parquet(path: Path, columns: dict[str, list[Any]]) -> Path:
-    import pyarrow
-    from pyarrow import parquet
-
-    with whole_file(path) as temporary:
-        parquet.write_table(pyarrow.table(columns), temporary)
-    return path
