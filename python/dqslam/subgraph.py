@@ -25,34 +25,38 @@ def rebuilt(core: _core.Graph, **changes: Any) -> _core.Graph:
 
 def only_objects(core: _core.Graph, kept: Bools) -> _core.Graph:
     """Return a problem with the objects `kept` (o,) only, and with their measurements only."""
-    row = np.cumsum(kept) - 1
+    return select_objects(core, np.flatnonzero(kept))
+
+
+def select_objects(core: _core.Graph, rows: Ints) -> _core.Graph:
+    """Return a problem with some objects only, in the order of their rows (p,)."""
+    place = np.full(core.num_objects, -1)
+    place[rows] = np.arange(len(rows))
     boxes, prior = core.boxes, core.size_prior
-    box = kept[boxes.object]
+    box = place[boxes.object] >= 0
     return rebuilt(
         core,
         boxes=_core.BoxTable(
             pose=boxes.pose[box],
-            object=row[boxes.object[box]],
+            object=place[boxes.object[box]],
             box=boxes.box[box],
             covariance=boxes.covariance[box],
             truncated=boxes.truncated[box],
         ),
         size_prior=_core.SizePriorTable(
-            log_mean=prior.log_mean[kept], log_sigma=prior.log_sigma[kept]
+            log_mean=prior.log_mean[rows], log_sigma=prior.log_sigma[rows]
         ),
-        measurements=[_only_kept(table, kept, row) for table in core.measurements],
-        shapes=[shape for shape, keep in zip(core.shapes, kept, strict=True) if keep]
-        if core.shapes
-        else [],
+        measurements=[_of_kept(table, place) for table in core.measurements],
+        shapes=[core.shapes[row] for row in rows.tolist()] if core.shapes else [],
     )
 
 
-def _only_kept(table: _core.MeasurementTable, kept: Bools, row: Ints) -> _core.MeasurementTable:
-    part = kept[table.object]
+def _of_kept(table: _core.MeasurementTable, place: Ints) -> _core.MeasurementTable:
+    part = place[table.object] >= 0
     return _core.MeasurementTable(
         kind=table.kind,
         pose=table.pose[part],
-        object=row[table.object[part]],
+        object=place[table.object[part]],
         value=table.value[part],
         covariance=table.covariance[part],
     )

@@ -36,6 +36,7 @@ def test_writes_what_it_says(files, orbit, capsys):
         "map.json",
         "odometry.txt",
         "report.json",
+        "graph.npz",
         "trajectory.txt",
     ]
     for name in ("trajectory.txt", "odometry.txt"):

@@ -21,6 +21,7 @@ from dqslam.pipeline.lens import widened
 from dqslam.pipeline.measurements import usable_measurements, with_measurements
 from dqslam.pipeline.online import estimate_online
 from dqslam.pipeline.options import Progress, RunOptions
+from dqslam.pipeline.problem import kept_problem
 from dqslam.recording import Recording
 
 
@@ -112,9 +113,11 @@ def run(
     shift[~held_out] = calibrated.detections.box - known.detections.box
     corrected = replace(boxes, box=boxes.box + shift)
     result = conclude(output, corrected, held_out, options, reference)
+    graph = kept_problem(output, calibrated, options.mode)
     shown = result.detections
     return replace(
         result,
         estimate=replace(result.estimate, camera=camera),
         detections=replace(shown, box=shown.box - shift - np.tile(offset, 2)),
+        graph=graph,
     )
