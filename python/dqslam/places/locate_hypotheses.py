@@ -34,8 +34,12 @@ _DISTANCE_SIGMA, _CUT_SIGMA = 0.05, 0.15
 _CUT_SIZE_SIGMA = 0.4
 # Rounds of Newton's method for three distances, and the largest chi-square of these.
 _ROUNDS, _MOST_CHI2 = 4, 16.0
-# Triples, at most: the best of more are taken.
-_MOST_TRIPLES = 20_000
+# After one round, a larger one does not fall that far.
+_HOPELESS_CHI2 = 50.0
+# Triples, and pairs that stand, at most, in a small and in a large map: the best of more are taken.
+_MOST_TRIPLES, _MOST_TRIPLES_LARGE = 20_000, 3_000
+# Pairs that follow one another, at most, among which triples are looked for.
+_MOST_CHAINS = 1_000_000
 # The least sine of the angle of a triple of objects: three in a line determine no pose.
 _LEAST_SINE = 0.1
 
@@ -104,18 +108,24 @@ def pair_up(place: PlaceMap, camera: _core.Camera, image: ImageBoxes) -> Pairing
     )
 
 
-def find_hypotheses(pairings: Pairings, whole: Bools, upright: Upright | None) -> Hypotheses:
-    """Find the poses of all pairs and triples that agree.
+def find_hypotheses(
+    pairings: Pairings, whole: Bools, upright: Upright | None, *, is_large: bool = False
+) -> Hypotheses:
+    """Find the poses of all pairs and triples that agree; in a large map, of the best supported.
 
     ``whole`` (b,) are the boxes without cut edges, which are preferred. Pairs need ``upright``.
     """
+    most = _MOST_TRIPLES_LARGE if is_large else _MOST_TRIPLES
     boxes, counts = np.unique(pairings.box, return_counts=True)
     chosen = boxes[np.lexsort((counts, ~whole[boxes]))[:_MOST_BOXES]]
     chosen, reach = _within_budget(pairings, chosen)
     pairs = _agreeing_pairs(pairings, chosen, reach)
-    triples = _supported(pairings, pairs, _triples(pairs, len(pairings)))
+    triples = _triples(pairs, len(pairings))
+    if is_large and len(triples) > most:
+        triples, pairs = _closed(pairings, pairs, triples, most)
+    triples = _supported(pairings, pairs, triples, most)
     found = [_resect(pairings, triples)]
-    if upright is not None and len(pairs) <= _MOST_TRIPLES:
+    if upright is not None and len(pairs) <= most:
         found.append(_stand(pairings, pairs, upright))
     return Hypotheses(
         np.concatenate([one.rotation for one in found]),
@@ -199,10 +209,10 @@ def _triples(pairs: Ints, count: int) -> Ints:
     pairs = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
     first = np.searchsorted(pairs[:, 0], np.arange(count + 1))
     onward = first[pairs[:, 1] + 1] - first[pairs[:, 1]]  # pairs that begin where each ends
-    if onward.sum() > 50 * _MOST_TRIPLES:  # keep those whose ends have the most neighbors
+    if onward.sum() > _MOST_CHAINS:  # keep those whose ends have the most neighbors
         degree = np.bincount(pairs.ravel(), minlength=count)
         best = np.argsort(-degree[pairs].min(axis=1), kind="stable")
-        keep = best[np.cumsum(onward[best]) <= 50 * _MOST_TRIPLES]
+        keep = best[np.cumsum(onward[best]) <= _MOST_CHAINS]
         return _triples(pairs[keep], count)
     pair = np.repeat(np.arange(len(pairs)), onward)
     step = np.arange(len(pair)) - np.repeat(np.cumsum(onward) - onward, onward)
@@ -214,15 +224,38 @@ def _triples(pairs: Ints, count: int) -> Ints:
     return np.asarray(np.column_stack([pairs[pair], third])[closed])
 
 
-def _supported(pairings: Pairings, pairs: Ints, triples: Ints) -> Ints:
-    """Keep the triples whose pairings agree with most other boxes, if there are very many."""
-    if len(triples) <= _MOST_TRIPLES:
-        return triples
+def _closed(pairings: Pairings, pairs: Ints, triples: Ints, most: int) -> tuple[Ints, Ints]:
+    """Keep the triples, and the pairs, with which most other boxes make triples.
+
+    Among thousands of objects, a pair agrees by chance with objects in many places. Boxes that agree
+    with both ends at once are fewer, and those of the right place are among them.
+    """
+    count = len(pairings)
+    known = np.sort(pairs[:, 0] * count + pairs[:, 1])
+    edges = [
+        np.searchsorted(known, triples[:, one] * count + triples[:, two])
+        for one, two in ((0, 1), (1, 2), (0, 2))
+    ]
+    third = pairings.box[triples]
+    closes = np.zeros((len(known), int(pairings.box.max()) + 1), dtype=np.bool_)
+    for edge, corner in zip(edges, (2, 0, 1), strict=True):
+        closes[edge, third[:, corner]] = True
+    of_pair = closes.sum(axis=1)
+    support = of_pair[edges[0]] + of_pair[edges[1]] + of_pair[edges[2]]
+    best = np.argsort(-support, kind="stable")[:most]
+    strong = known[np.argsort(-of_pair, kind="stable")[:most]]
+    return triples[best], np.column_stack([strong // count, strong % count])
+
+
+def _supported(pairings: Pairings, pairs: Ints, groups: Ints, most: int) -> Ints:
+    """Keep the groups (t, k) whose pairings agree with most other boxes, if there are very many."""
+    if len(groups) <= most:
+        return groups
     agrees = np.zeros((len(pairings), int(pairings.box.max()) + 1), dtype=np.bool_)
     for one, other in ((0, 1), (1, 0)):
         agrees[pairs[:, one], pairings.box[pairs[:, other]]] = True
-    support = agrees.sum(axis=1)[triples].sum(axis=1)
-    return triples[np.argsort(-support, kind="stable")[:_MOST_TRIPLES]]
+    support = agrees.sum(axis=1)[groups].sum(axis=1)
+    return groups[np.argsort(-support, kind="stable")[:most]]
 
 
 def _resect(pairings: Pairings, triples: Ints) -> Hypotheses:
@@ -234,6 +267,8 @@ def _resect(pairings: Pairings, triples: Ints) -> Hypotheses:
     lengths = np.linalg.norm(one, axis=1) * np.linalg.norm(two, axis=1)
     bent = np.linalg.norm(np.cross(one, two), axis=1) > _LEAST_SINE * lengths
     triples, world, ray = triples[bent], world[bent], ray[bent]
+    _, chi2 = _solve_distances(pairings, triples, rounds=1)
+    triples, world, ray = (one[chi2 < _HOPELESS_CHI2] for one in (triples, world, ray))
     log_distance, chi2 = _solve_distances(pairings, triples)
     fits = np.flatnonzero(chi2 < _MOST_CHI2)
     if len(fits) > _MOST_TRIPLES:
@@ -275,7 +310,9 @@ def _stand(pairings: Pairings, pairs: Ints, upright: Upright) -> Hypotheses:
     return Hypotheses(np.concatenate(rotations), np.concatenate(positions))
 
 
-def _solve_distances(pairings: Pairings, groups: Ints) -> tuple[Floats, Floats]:
+def _solve_distances(
+    pairings: Pairings, groups: Ints, *, rounds: int = _ROUNDS
+) -> tuple[Floats, Floats]:
     """Find the distances whose differences are the map's, near those of the apparent sizes.
 
     The groups (t, k) are pairs or triples. Return the logarithms of the distances (t, k) and the
@@ -288,7 +325,7 @@ def _solve_distances(pairings: Pairings, groups: Ints) -> tuple[Floats, Floats]:
     known = np.linalg.norm(world[:, first] - world[:, second], axis=2)
     relative = 0.5 * np.maximum(blur[:, first], blur[:, second])
     log_distance = start.copy()
-    for last in [False] * _ROUNDS + [True]:
+    for last in [False] * rounds + [True]:
         distance = np.exp(log_distance)
         a, b = distance[:, first], distance[:, second]
         seen = np.sqrt(np.maximum(a**2 + b**2 - 2.0 * a * b * cosine, 1e-12))

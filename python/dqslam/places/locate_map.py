@@ -23,6 +23,9 @@ _ASSUMED_SIGHT = 40.0
 _SIZE_SIGMA = 0.1
 # The ratio of the axes, as a logarithm, that becomes a part of that spread.
 _ASPECT_SHARE = 0.3
+# What is in view is around a point at this share of the sight ahead, within this share of it, and
+# is so many objects at most; objects around which they are counted.
+AHEAD, REACH, MOST_OBJECTS, _MOST_SAMPLES = 0.4, 0.6, 200, 500
 # Directions from which the map saw an object, at most.
 _MOST_DIRECTIONS = 32
 
@@ -86,6 +89,19 @@ class PlaceMap:
         from scipy.spatial import cKDTree
 
         return cKDTree(self.ellipsoids[:, :3])
+
+    @cached_property
+    def in_reach(self) -> int:
+        """How many objects around a point ahead of a camera may be in its sight, 200 at most.
+
+        That is the number within ``REACH`` of the sight around an object, which one in twenty
+        exceeds.
+        """
+        centers = self.ellipsoids[:, :3]
+        some = centers[:: -(-len(centers) // _MOST_SAMPLES)]
+        radius = REACH * self.sensor.sight
+        counts = self.tree.query_ball_point(some, radius, return_length=True)
+        return min(int(np.quantile(counts, 0.95)) + 1, MOST_OBJECTS, len(centers))
 
     @cached_property
     def size(self) -> Floats:
