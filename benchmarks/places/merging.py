@@ -53,9 +53,7 @@ def run(seed: int, *, solves: bool = True) -> Trial:
 
 
 def _merge(seed: int, a: Robot, b: Robot, directory: Path, *, solves: bool) -> Trial:
-    maps = [
-        _landmarks(one, directory / str(row), solves=solves) for row, one in enumerate((a, b))
-    ]
+    maps = [_landmarks(one, directory / str(row), solves=solves) for row, one in enumerate((a, b))]
     single = tuple(float(_errors(one).mean()) for one in (a, b))
     honest = tuple(
         _nees(one.centers - robot.truth.center[one.object_ids], one.covariances)

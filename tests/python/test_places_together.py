@@ -114,9 +114,7 @@ def test_two_objects_that_were_paired_are_parted_and_missed_pairs_are_found(fold
         b_ids=np.array([near, *[one for one in found.a_ids if one not in (0, near)]]),
     )
     options = _core.SolveOptions(loss=_core.Loss.CAUCHY)
-    joint = solve_together(
-        (graphs[0], estimates[0]), (graphs[1], estimates[1]), wrong, options
-    )
+    joint = solve_together((graphs[0], estimates[0]), (graphs[1], estimates[1]), wrong, options)
     assert joint.merged_ids.tolist() == list(range(10))
     assert len(joint.estimate.object_ids) == 10
 

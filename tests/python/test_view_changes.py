@@ -43,11 +43,16 @@ def test_objects_are_named_and_colored_by_what_became_of_them(later):
     results = dq.load_results(later / "map")
     plain = build_scene(results)
     scene = with_changes(plain, later / "changes.json")
-    told = {one["second_id"]: one for one in json.loads((later / "changes.json").read_text())["objects"]}
+    told = {
+        one["second_id"]: one for one in json.loads((later / "changes.json").read_text())["objects"]
+    }
     assert told[0]["status"] == "moved"
     assert told[1]["status"] == "appeared"
     moved, appeared, stayed = scene.objects[0], scene.objects[1], scene.objects[2]
-    assert (moved.class_name, moved.color) == (f"{plain.objects[0].class_name}: moved", COLORS["moved"])
+    assert (moved.class_name, moved.color) == (
+        f"{plain.objects[0].class_name}: moved",
+        COLORS["moved"],
+    )
     assert moved.numbers[0][1].endswith("by 0.5 m")
     assert appeared.color == COLORS["appeared"]
     assert stayed.class_name.endswith(": stayed")

@@ -151,5 +151,7 @@ class MapOfSession:
             object_ids=self.estimate.object_ids,
             class_names=self.estimate.class_names,
             observations=np.bincount(core.boxes.object, minlength=core.num_objects),
-            lens=self.estimate.camera.lens if isinstance(self.estimate.camera, LensCamera) else None,
+            lens=self.estimate.camera.lens
+            if isinstance(self.estimate.camera, LensCamera)
+            else None,
         )

@@ -88,8 +88,9 @@ def merge(
     """Merge maps of one place: align them, join what is in several, and keep all trajectories.
 
     The frame is that of the first map, and its objects keep their ids. Another map is merged as
-    soon as it can be aligned with those before, one with a problem before one without. An object that several maps have is where their
-    covariances weigh it, with a covariance that knows that the errors of one map are alike.
+    soon as it can be aligned with those before, one with a problem before one without. An object
+    that several maps have is where their covariances weigh it, with a covariance that knows that
+    the errors of one map are alike.
     Its size and orientation are those of the map that knows them best.
 
     Folders of results with a ``graph.npz`` are solved again as one problem, as by ``merge_graphs``,
@@ -201,9 +202,7 @@ def _solve(
     parts = []
     for part in merged.parts:
         mapped = np.isin(part.merged_ids, together.object_ids)
-        kept = replace(
-            part, object_ids=part.object_ids[mapped], merged_ids=part.merged_ids[mapped]
-        )
+        kept = replace(part, object_ids=part.object_ids[mapped], merged_ids=part.merged_ids[mapped])
         parts.append(_with_poses(kept, paths, begin))
         begin += len(part.poses)
     object_ids, merged_ids = joined_ids(joint, second)

@@ -170,7 +170,9 @@ def _solve_pairs(
     new = row_of_b >= count
     frame = pose_of(np.asarray(np.linalg.inv(found.b_from_a), dtype=np.float64), model)
     poses = np.concatenate([start_a.poses, moved_poses(frame, start_b.poses, model)])
-    initial = np.concatenate([a.core.initial_poses, moved_poses(frame, b.core.initial_poses, model)])
+    initial = np.concatenate(
+        [a.core.initial_poses, moved_poses(frame, b.core.initial_poses, model)]
+    )
     core = joined_tables(a.core, b.core, poses, initial, row_of_b, new)
     shift = time_shift(float(a.timestamps[-1]), float(b.timestamps[0]))
     graph = Graph(

@@ -1,4 +1,4 @@
-"""The tables of two problems, one after the other, and what is moved into the frame of the first."""
+"""The tables of two problems, one after the other, in the frame of the first."""
 
 from __future__ import annotations
 
@@ -69,6 +69,7 @@ def pose_of(matrix: Floats, model: _core.PoseModel) -> Floats:
 
 
 def moved_poses(frame: Floats, poses: Floats, model: _core.PoseModel) -> Floats:
+    """Return poses (n, d) moved by a pose (d,), frame_from_theirs."""
     return np.asarray(_core.compose(model, np.tile(frame, (len(poses), 1)), poses))
 
 

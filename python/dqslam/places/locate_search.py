@@ -8,8 +8,9 @@ import numpy as np
 
 from dqslam import _core
 from dqslam._checks import Bools, Floats, Ints
-from dqslam.places.locate_hypotheses import Hypotheses, find_hypotheses, pair_up
+from dqslam.places.locate_hypotheses import Hypotheses, find_hypotheses
 from dqslam.places.locate_map import MOST_OBJECTS, PlaceMap
+from dqslam.places.locate_pairs import pair_up
 from dqslam.places.locate_quick import quick_score
 from dqslam.places.locate_score import SE3, Frame, Matches, Scored, Scorer
 
@@ -23,7 +24,9 @@ _SAME_SHARE, _SAME_ANGLE = 0.03, 0.1
 # Side of the cells in which similar hypotheses are counted, and the number of grids; what makes
 # one number of the nine of a cell.
 _CELL, _GRIDS = 2.0, 6
-_HASH = np.array([73856093, 19349663, 83492791, 49979687, 86028121, 67867967, 32452843, 15485863, 1])
+_HASH = np.array(
+    [73856093, 19349663, 83492791, 49979687, 86028121, 67867967, 32452843, 15485863, 1]
+)
 # Poses as near as this are one answer.
 _ONE_SHARE, _ONE_ANGLE = 0.12, 0.25
 

@@ -65,9 +65,7 @@ def with_changes(scene: Scene, path: str | Path) -> Scene:
             raise FileError(path, f"objects row {row}: no {error.args[0]}") from None
         except (ValueError, TypeError) as error:
             raise FileError(path, f"objects row {row}: {error}") from None
-    counts = [
-        (f"{sum(one.get('status') == status for one in rows)}", status) for status in COLORS
-    ]
+    counts = [(f"{sum(one.get('status') == status for one in rows)}", status) for status in COLORS]
     told = ("changes", ", ".join(f"{count} {status}" for count, status in counts if count != "0"))
     return replace(scene, objects=(*objects, *before), overview=(*scene.overview, told))
 
