@@ -32,11 +32,11 @@ def test_writes_what_it_says(files, orbit, capsys):
         "camera.json",
         "config.toml",
         "covariance.csv",
+        "graph.npz",
         "manifest.json",
         "map.json",
         "odometry.txt",
         "report.json",
-        "graph.npz",
         "trajectory.txt",
     ]
     for name in ("trajectory.txt", "odometry.txt"):

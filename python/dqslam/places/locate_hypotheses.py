@@ -79,7 +79,8 @@ def _resect(pairings: Pairings, triples: Ints) -> Hypotheses:
     bent = np.linalg.norm(np.cross(one, two), axis=1) > _LEAST_SINE * lengths
     triples, world, ray = triples[bent], world[bent], ray[bent]
     _, chi2 = _solve_distances(pairings, triples, rounds=1)
-    triples, world, ray = (one[chi2 < _HOPELESS_CHI2] for one in (triples, world, ray))
+    hopeful = chi2 < _HOPELESS_CHI2
+    triples, world, ray = triples[hopeful], world[hopeful], ray[hopeful]
     log_distance, chi2 = _solve_distances(pairings, triples)
     fits = np.flatnonzero(chi2 < _MOST_CHI2)
     if len(fits) > _MOST_TRIPLES:

@@ -66,8 +66,9 @@ def with_changes(scene: Scene, path: str | Path) -> Scene:
         except (ValueError, TypeError) as error:
             raise FileError(path, f"objects row {row}: {error}") from None
     counts = [(f"{sum(one.get('status') == status for one in rows)}", status) for status in COLORS]
-    told = ("changes", ", ".join(f"{count} {status}" for count, status in counts if count != "0"))
-    return replace(scene, objects=(*objects, *before), overview=(*scene.overview, told))
+    total = ", ".join(f"{count} {status}" for count, status in counts if count != "0")
+    overview = (*scene.overview, ("changes", total))
+    return replace(scene, objects=(*objects, *before), overview=overview)
 
 
 def _read(path: str | Path) -> list[dict[str, Any]]:
