@@ -33,18 +33,27 @@ class Trial:
     """Mean error of each map alone, in its own frame."""
     single_nees: tuple[float, float]
     """NEES of the centers of each map alone, divided by 3."""
+    twice: int = 0
+    """Objects that both have and that the merged map has twice."""
+    wrong: int = 0
+    """Objects of both maps that were taken for one, and are two."""
 
 
-def _landmarks(robot: Robot, folder: Path) -> Landmarks:
-    dq.save_estimate(robot.estimate, folder, marginals=robot.marginals)
+def _landmarks(robot: Robot, folder: Path, *, solves: bool) -> Landmarks:
+    graph = robot.graph if solves else None
+    dq.save_estimate(robot.estimate, folder, marginals=robot.marginals, graph=graph)
     return read_landmarks(folder)
 
 
-def run(seed: int) -> Trial:
-    """Merge the maps of two robots."""
+def run(seed: int, *, solves: bool = True) -> Trial:
+    """Merge the maps of two robots; ``solves`` says whether their folders have their problems."""
     a, b = two_robots(seed)
     with tempfile.TemporaryDirectory() as directory:
-        maps = [_landmarks(one, Path(directory) / str(row)) for row, one in enumerate((a, b))]
+        return _merge(seed, a, b, Path(directory), solves=solves)
+
+
+def _merge(seed: int, a: Robot, b: Robot, directory: Path, *, solves: bool) -> Trial:
+    maps = [_landmarks(one, directory / str(row), solves=solves) for row, one in enumerate((a, b))]
     single = tuple(float(_errors(one).mean()) for one in (a, b))
     honest = tuple(
         _nees(one.centers - robot.truth.center[one.object_ids], one.covariances)
@@ -63,16 +72,23 @@ def run(seed: int) -> Trial:
     both = a.truth.center[np.intersect1d(a.estimate.object_ids, b.estimate.object_ids)]
     turn = (found.b_from_a @ np.linalg.inv(truth))[:2, 0]
     apart = both @ (found.b_from_a - truth)[:3, :3].T + (found.b_from_a - truth)[:3, 3]
-    true_ids = np.concatenate(
-        [maps[0].object_ids, np.full(len(merged.landmarks) - len(maps[0]), -1)]
-    )
-    alone = merged.parts[1].merged_ids
-    rows = np.searchsorted(merged.landmarks.object_ids, alone)
-    new = rows >= len(maps[0])
-    true_ids[rows[new]] = maps[1].object_ids[new]
+    true_of: dict[int, int] = {}
+    for part in reversed(merged.parts):  # an object of both is that of the first map
+        true_of |= dict(zip(part.merged_ids.tolist(), part.object_ids.tolist(), strict=True))
+    true_ids = [true_of[one] for one in merged.landmarks.object_ids.tolist()]
     errors = merged.landmarks.centers - a.truth.center[true_ids]
+    ids_of_a = dict(zip(merged.parts[0].merged_ids, merged.parts[0].object_ids, strict=True))
+    pairs = [
+        (own, ids_of_a[here])
+        for own, here in zip(merged.parts[1].object_ids, merged.parts[1].merged_ids, strict=True)
+        if here in ids_of_a
+    ]
+    right = sum(own == other for own, other in pairs)
+    common = np.intersect1d(merged.parts[0].object_ids, merged.parts[1].object_ids)
     return replace(
         nothing,
+        twice=len(common) - right,
+        wrong=len(pairs) - right,
         turn_deg=float(np.degrees(np.arctan2(turn[1], turn[0]))),
         shift_m=float(np.linalg.norm(apart[:, :2], axis=1).mean()),
         nees=_nees(errors, merged.landmarks.covariances),

@@ -15,11 +15,14 @@ from benchmarks.places import merging, real
 def merge_pairs(
     trials: Annotated[int, typer.Option(min=1, help="Pairs of robots.")] = 60,
     seed: Annotated[int, typer.Option(min=0, help="Of the first pair.")] = 0,
+    solves: Annotated[
+        bool, typer.Option("--solve/--fuse", help="With the problems of both maps, or without.")
+    ] = True,
 ) -> None:
     """Merge the maps of two simulated robots: how often, how well, and how honestly."""
     found = []
     for number in range(seed, seed + trials):
-        found.append(merging.run(number))
+        found.append(merging.run(number, solves=solves))
         one = found[-1]
         told = one.refused or f"aligned, {one.shift_m:.3f} m off, NEES / 3 {one.nees:.2f}"
         typer.echo(f"== {number}: {told}", err=True)
@@ -43,6 +46,8 @@ def _show(found: list[merging.Trial]) -> None:
     say(f"pairs of robots: {len(found)}, refused: {len(found) - len(aligned)}")
     if not aligned:
         return
+    twice, wrong = (sum(getattr(one, name) for one in aligned) for name in ("twice", "wrong"))
+    say(f"objects of both that the merged map has twice: {twice}; two taken for one: {wrong}")
     rows = {
         "turn of the alignment, error [deg]": [abs(one.turn_deg) for one in aligned],
         "common objects, error of the alignment [m]": [one.shift_m for one in aligned],

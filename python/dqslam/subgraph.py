@@ -27,49 +27,53 @@ def rebuilt(core: _core.Graph, **changes: Any) -> _core.Graph:
 
 def only_objects(core: _core.Graph, kept: Bools) -> _core.Graph:
     """Return a problem with the objects `kept` (o,) only, and with their measurements only."""
-    row = np.cumsum(kept) - 1
+    return select_objects(core, np.flatnonzero(kept))
+
+
+def select_objects(core: _core.Graph, rows: Ints) -> _core.Graph:
+    """Return a problem with some objects only, in the order of their rows (p,)."""
+    place = np.full(core.num_objects, -1)
+    place[rows] = np.arange(len(rows))
     boxes, prior = core.boxes, core.size_prior
-    box = kept[boxes.object]
+    box = place[boxes.object] >= 0
     return rebuilt(
         core,
         boxes=_core.BoxTable(
             pose=boxes.pose[box],
-            object=row[boxes.object[box]],
+            object=place[boxes.object[box]],
             box=boxes.box[box],
             covariance=boxes.covariance[box],
             truncated=boxes.truncated[box],
         ),
         size_prior=_core.SizePriorTable(
-            log_mean=prior.log_mean[kept],
-            log_sigma=prior.log_sigma[kept],
-            shared=prior.shared[kept] if len(prior.shared) else prior.shared,
+            log_mean=prior.log_mean[rows],
+            log_sigma=prior.log_sigma[rows],
+            shared=prior.shared[rows] if len(prior.shared) else prior.shared,
         ),
-        placements=_placements_of(core.placements, kept, row),
-        measurements=[_only_kept(table, kept, row) for table in core.measurements],
-        shapes=[shape for shape, keep in zip(core.shapes, kept, strict=True) if keep]
-        if core.shapes
-        else [],
+        placements=_placements_of(core.placements, place),
+        measurements=[_of_kept(table, place) for table in core.measurements],
+        shapes=[core.shapes[row] for row in rows.tolist()] if core.shapes else [],
     )
 
 
-def _placements_of(table: _core.PlacementTable, kept: Bools, row: Ints) -> _core.PlacementTable:
-    part = kept[table.object] & ((table.other < 0) | kept[table.other])
+def _placements_of(table: _core.PlacementTable, place: Ints) -> _core.PlacementTable:
+    part = (place[table.object] >= 0) & ((table.other < 0) | (place[table.other] >= 0))
     return _core.PlacementTable(
         kind=[kind for kind, keep in zip(table.kind, part, strict=True) if keep],
-        object=row[table.object[part]],
-        other=np.where(table.other[part] < 0, -1, row[table.other[part]]),
+        object=place[table.object[part]],
+        other=np.where(table.other[part] < 0, -1, place[table.other[part]]),
         shared=table.shared[part],
         distance=table.distance[part],
         sigma=table.sigma[part],
     )
 
 
-def _only_kept(table: _core.MeasurementTable, kept: Bools, row: Ints) -> _core.MeasurementTable:
-    part = kept[table.object]
+def _of_kept(table: _core.MeasurementTable, place: Ints) -> _core.MeasurementTable:
+    part = place[table.object] >= 0
     return _core.MeasurementTable(
         kind=table.kind,
         pose=table.pose[part],
-        object=row[table.object[part]],
+        object=place[table.object[part]],
         value=table.value[part],
         covariance=table.covariance[part],
     )

@@ -90,3 +90,16 @@ def test_noise_stays_within_limits():
     kept = NOISE.with_variances(np.array([0.0, 0.0, 1e9, 1e9]))
     assert kept.new == BoxNoise(0.1, 1e-4)
     assert kept.repeated == BoxNoise(10.0, 0.15)
+
+
+def test_variances_of_views_together_by_hand():
+    """Four views from one side repeat their error; four from opposite sides do not."""
+    side = np.full((4, 4), 100.0)
+    new, repeated = (part[0, 0] for part in NOISE.edge_variances(side))
+    alike = NOISE.together(np.tile([2.0, 0.0, 0.0], (4, 1)), side)
+    np.testing.assert_allclose(alike, new + 4.0 * repeated)
+    # The mean of four such independent boxes has the variance that the mean of the four views has.
+    assert alike[0, 0] / 4.0 == pytest.approx(new / 4.0 + repeated)
+    apart = NOISE.together(np.array([[1.0, 0, 0], [-1.0, 0, 0]]), side[:2])
+    shared = np.exp(-np.pi / NOISE.angle)
+    np.testing.assert_allclose(apart, new + (1.0 + shared) * repeated)

@@ -32,6 +32,7 @@ def test_writes_what_it_says(files, orbit, capsys):
         "camera.json",
         "config.toml",
         "covariance.csv",
+        "graph.npz",
         "manifest.json",
         "map.json",
         "odometry.txt",

@@ -36,7 +36,9 @@ def height_error(estimate, truth):
 def test_objects_on_a_table(table, mode):
     recording, truth = table
     if mode == dq.Mode.MAPPING:
-        recording = replace(recording, odometry=dq.Odometry.from_poses(truth.poses, covariance=np.eye(6)))
+        recording = replace(
+            recording, odometry=dq.Odometry.from_poses(truth.poses, covariance=np.eye(6))
+        )
     options = dq.RunOptions(mode=mode, trust_ids=1.0)
     without = dq.run(recording, options)
     result = dq.run(recording, replace(options, placements=ON_A_PLANE))

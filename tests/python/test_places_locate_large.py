@@ -2,17 +2,22 @@
 
 import numpy as np
 import pytest
+from benchmarks.places import rooms
 from scipy.spatial import cKDTree
 
+import dqslam as dq
 from dqslam.places import locate_quick
-from dqslam.places.locate_hypotheses import (
+from dqslam.places.locate_hypotheses import Hypotheses
+from dqslam.places.locate_map import REACH
+from dqslam.places.locate_pairs import (
     _MOST_COMPARED,
-    Hypotheses,
     Pairings,
-    _agreeing_pairs,
     _agrees,
     _reaches,
-    _within_budget,
+    agreeing_pairs,
+    closed,
+    triangles,
+    within_budget,
 )
 
 
@@ -41,7 +46,7 @@ def strewn(random, boxes, objects, extent):
 def test_no_pair_that_agrees_is_beyond_the_reach(seed):
     pairings = strewn(np.random.default_rng(seed), boxes=5, objects=60, extent=15.0)
     boxes = np.arange(5)
-    found = _agreeing_pairs(pairings, boxes, _reaches(pairings, boxes))
+    found = agreeing_pairs(pairings, boxes, _reaches(pairings, boxes))
     i, j = np.triu_indices(len(pairings), 1)
     other = pairings.box[i] != pairings.box[j]
     i, j = i[other], j[other]
@@ -53,7 +58,7 @@ def test_no_pair_that_agrees_is_beyond_the_reach(seed):
 
 def test_boxes_are_left_out_until_few_enough_pairs_are_compared():
     pairings = strewn(np.random.default_rng(1), boxes=10, objects=3000, extent=150.0)
-    boxes, reach = _within_budget(pairings, np.arange(10))
+    boxes, reach = within_budget(pairings, np.arange(10))
     assert 3 <= len(boxes) < 10
     trees = [cKDTree(pairings.center[pairings.box == one]) for one in boxes.tolist()]
     pairs = [
@@ -64,16 +69,16 @@ def test_boxes_are_left_out_until_few_enough_pairs_are_compared():
     # At the border of the square there are fewer.
     assert len(boxes) == 3 or 0.4 * _MOST_COMPARED < sum(pairs) < _MOST_COMPARED
     few = strewn(np.random.default_rng(1), boxes=10, objects=30, extent=15.0)
-    assert len(_within_budget(few, np.arange(10))[0]) == 10
+    assert len(within_budget(few, np.arange(10))[0]) == 10
 
 
 def test_no_box_has_no_reach():
     none = strewn(np.random.default_rng(0), boxes=1, objects=0, extent=1.0)
-    boxes, reach = _within_budget(none, np.zeros(0, dtype=np.int64))
+    boxes, reach = within_budget(none, np.zeros(0, dtype=np.int64))
     assert (boxes.shape, reach.shape) == ((0,), (0, 0))
 
 
-def test_objects_near_a_hypothesis_score_as_all_do(monkeypatch):
+def test_objects_near_a_hypothesis_score_as_all_do():
     """Where all objects are near, both ways of scoring are one."""
     from types import SimpleNamespace
 
@@ -88,12 +93,39 @@ def test_objects_near_a_hypothesis_score_as_all_do(monkeypatch):
         tree=cKDTree(center),
         size=np.column_stack([pairings.log_distance[:50] + log_half, np.full(50, 0.15)]),
         sensor=SimpleNamespace(sight=5.0),
+        in_reach=50,
     )
     usual = pairings.log_distance.reshape(4, 50)
     assert np.ptp(usual - usual[0], axis=1) == pytest.approx(np.zeros(4), abs=1e-12)
     gain = random.uniform(1.0, 9.0, len(pairings))
     every = locate_quick._score_all(place, pairings, gain, found)
-    monkeypatch.setattr(locate_quick, "MOST_OBJECTS", 50)
     near = locate_quick._score_near(place, pairings, gain, found)
     assert every.max() > 1.0
     np.testing.assert_allclose(near, every, rtol=1e-9)
+
+
+def test_triples_that_most_boxes_close_are_kept():
+    """Five pairings of five boxes agree with each other, among forty that agree in a ring."""
+    pairings = strewn(np.random.default_rng(0), boxes=5, objects=9, extent=8.0)
+    right = np.array([0, 9 + 1, 18 + 2, 27 + 3, 36 + 4])  # box 0 with object 0, ...
+    clique = [(a, b) for k, a in enumerate(right) for b in right[k + 1 :]]
+    chance = [(8, 9 + 7), (8, 18 + 7), (9 + 7, 18 + 7), (7, 27 + 6), (7, 36 + 6), (27 + 6, 36 + 6)]
+    pairs = np.array(sorted(clique + chance))
+    triples = triangles(pairs, len(pairings))
+    assert len(triples) == 10 + 2
+    kept, strong = closed(pairings, pairs, triples, 10)
+    assert set(kept.ravel().tolist()) == set(right.tolist())
+    assert set(map(tuple, strong.tolist())) == {tuple(map(int, one)) for one in clique}
+
+
+def test_as_many_objects_as_are_in_reach():
+    room = rooms.furnish(
+        30.0, np.full((2, 3), 0.1), np.zeros(900, dtype=int), np.random.default_rng(0)
+    )
+    results = rooms.map_room(room, 20, np.random.default_rng(0), everything=True)
+    place = dq.PlaceMap.of(results)
+    around = np.pi * (REACH * place.sensor.sight) ** 2  # one object on each square meter
+    assert 0.6 * around < place.in_reach < min(1.4 * around, 201)
+    nine = room.select(np.arange(9))
+    small = dq.PlaceMap.of(rooms.map_room(nine, 20, np.random.default_rng(0), everything=True))
+    assert small.in_reach <= 9

@@ -64,6 +64,19 @@ class RepeatedNoise:
         new, repeated = (part.pixels**2 + (part.relative * side) ** 2 for part in parts)
         return new, repeated
 
+    def together(self, towards: Floats, side: Floats) -> Floats:
+        """Return variances of edges (n, 4) with which boxes of one object tell as much as they do.
+
+        In a problem whose boxes are independent, those of n views from one side would agree as if
+        their repeated error shrank by 1 / n. It is therefore multiplied by the sum of a view's
+        correlations with all, which is n in that case and 1 if no two views are alike.
+
+        ``towards`` (n, 3) is that of ``correlation``, ``side`` (n, 4) are the sides across the
+        edges, pixels.
+        """
+        new, repeated = self.edge_variances(side)
+        return np.asarray(new + repeated * self.correlation(towards).sum(axis=1)[:, None])
+
     def times(self, factors: Floats) -> RepeatedNoise:
         """Return the noise of an object, whose variances are so many times as large, (2,)."""
         return self.with_variances(self.variances * np.repeat(factors, 2))

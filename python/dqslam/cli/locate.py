@@ -21,7 +21,13 @@ MOST_LISTED = 40
 
 @with_groups
 def locate(
-    known: Annotated[Path, typer.Argument(metavar="MAP", help="Directory that `run` wrote.")],
+    known: Annotated[
+        Path,
+        typer.Argument(
+            metavar="MAP",
+            help="Directory that `run` wrote, or a map.json or CSV of objects with their sizes.",
+        ),
+    ],
     files: ImageOptions,
     odometry: Annotated[
         Path | None,

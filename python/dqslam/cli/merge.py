@@ -23,8 +23,10 @@ def merge(
 ) -> None:
     """Merge maps of one place into one result, in the frame of the first.
 
-    Writes map.json and merge.json and, of folders of results, trajectory.txt, odometry.txt,
-    camera.json, covariance.csv and boxes.csv: what `dqslam plot`, `view` and `evaluate` read. Exits
+    Folders of results that have a graph.npz are solved as one problem; other maps are fused by
+    their covariances. Writes map.json and merge.json and, of folders of results, trajectory.txt,
+    odometry.txt, camera.json, covariance.csv, boxes.csv and graph.npz: what `dqslam plot`, `view`
+    and `evaluate` read. Exits
     with 3, and writes nothing, if a map cannot be aligned with the others.
     """
     from dqslam import places
@@ -41,6 +43,7 @@ def merge(
     for part in merged.parts[1:]:
         pairs = 0 if part.alignment is None else len(part.alignment)
         output.line(f"{part.name}: {pairs} of {len(part.object_ids)} objects are in the map before")
+        output.line(f"  fused: {part.why_fused}" if part.why_fused else "  solved together")
     output.line(f"{len(merged.landmarks)} objects, {sum(len(p.poses) for p in merged.parts)} poses")
     if json:
         import json as parser

@@ -37,6 +37,13 @@ def view(
     groundtruth: TruthFile = None,
     objects: TrueObjectsFile = None,
     align: Alignment = "se3",
+    changes: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.json",
+            help="Show what has changed: the changes.json of `dqslam changes A DIR`.",
+        ),
+    ] = None,
     export: Annotated[
         Path | None,
         typer.Option(metavar="PAGE", help="Write a folder for any web server, and stop."),
@@ -88,6 +95,7 @@ def view(
     from dqslam import io
     from dqslam._colors import ESTIMATE
     from dqslam.view import build_scene, rgb, write_mcap, write_rerun
+    from dqslam.view.changes import with_changes
     from dqslam.view.page import WRITTEN_BY, write_page_files
     from dqslam.view.photographs import write_photographs
 
@@ -96,7 +104,7 @@ def view(
         raise ValueError("--images are shown by the page of --export only")
     if images is not None and find_spec("PIL") is None:
         raise ValueError("images need Pillow: pip install 'dqslam[plot]'")
-    inputs = (directory, groundtruth, objects, images, frame_times)
+    inputs = (directory, groundtruth, objects, changes, images, frame_times)
     read = [*inputs, *(directory.iterdir() if directory.is_dir() else ())]
     for file in (rerun, mcap, ply):
         if file is not None:
@@ -106,6 +114,8 @@ def view(
     with output.waiting("reading"):
         results, truth, true_objects = read_with_truth(directory, groundtruth, objects)
         scene = build_scene(results, groundtruth=truth, objects=true_objects, align=align)
+        if changes is not None:
+            scene = with_changes(scene, changes)
         times = given_frame_times(frame_times, frame_rate)
         found = None if images is None else io.find_images(images, results.timestamps, times)
     written: dict[str, str] = {}
@@ -129,7 +139,8 @@ def view(
             write_mcap(scene, mcap, progress)
         written["mcap"] = str(mcap)
     if ply is not None:
-        io.write_ply(ply, results, [rgb(one.color) for one in scene.objects], rgb(ESTIMATE))
+        colors = [rgb(one.color) for one in scene.objects[: len(results.objects)]]
+        io.write_ply(ply, results, colors, rgb(ESTIMATE))
         written["ply"] = str(ply)
     for path in written.values():
         output.line(f"wrote {path}")

@@ -13,12 +13,14 @@ from dqslam import _core
 from dqslam._checks import Floats
 from dqslam._ids import ObjectId, ObjectRow
 from dqslam.estimate import Estimate
+from dqslam.graph import Graph
 from dqslam.io import FileError, save_estimate
-from dqslam.io.results import ellipsoid_covariances, load_map_results
-from dqslam.lens import camera_with, lens_of
+from dqslam.io.results import GRAPH_FILE, ellipsoid_covariances, load_map_results, read_graph
+from dqslam.lens import LensCamera, camera_with, lens_of
 from dqslam.online.readout import read_estimate
 from dqslam.online.state import State
 from dqslam.recording import tangent_size
+from dqslam.subgraph import select_objects
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,9 +45,13 @@ class _Covariances:
 def load_map(directory: str | Path, robot_from_camera: ArrayLike | None = None) -> KnownMap:
     """Read the ellipsoids of a result, and their covariances.
 
-    A result does not have the mount of the camera, which is the identity by default.
+    The mount of the camera is by default that of the problem in the folder, and the identity if it
+    has none.
     """
     results = load_map_results(directory)
+    saved = results.directory / GRAPH_FILE
+    if robot_from_camera is None and saved.is_file():
+        robot_from_camera = read_graph(saved).core.camera.robot_from_camera
     objects = results.objects
     rows = np.flatnonzero(objects.is_ellipsoid)
     is_of_no_steps = not len(results.timestamps) and not len(objects)
@@ -122,4 +128,30 @@ class MapOfSession:
         objects = np.array([covariances.get(row, unknown) for row in self.rows]).reshape(-1, 9, 9)
         k = tangent_size(self.estimate.pose_model)
         poses = np.full((len(self.estimate.poses), k, k), np.nan)
-        save_estimate(self.estimate, directory, marginals=_Covariances(poses, objects))
+        save_estimate(
+            self.estimate,
+            directory,
+            marginals=_Covariances(poses, objects),
+            graph=self._graph(),
+            options=self.options,
+        )
+
+    def _graph(self) -> Graph | None:
+        """Return the problem of the mapped objects; None where priors of a map are part of it."""
+        if self.problem is None or not len(self.estimate.object_ids):
+            return None
+        core, rows, _ = self.problem
+        place = {row: number for number, row in enumerate(rows)}
+        if any(row not in place for row in self.rows):
+            return None
+        core = select_objects(core, np.array([place[row] for row in self.rows], dtype=np.int64))
+        return Graph(
+            core=core,
+            timestamps=self.estimate.timestamps,
+            object_ids=self.estimate.object_ids,
+            class_names=self.estimate.class_names,
+            observations=np.bincount(core.boxes.object, minlength=core.num_objects),
+            lens=self.estimate.camera.lens
+            if isinstance(self.estimate.camera, LensCamera)
+            else None,
+        )

@@ -283,7 +283,8 @@ class OnlineSlam(SessionReader):
         Parameters
         ----------
         robot_from_camera
-            Mount of the camera, which results do not have; by default the identity.
+            Mount of the camera, by default that of the problem in the folder (``graph.npz``), or
+            else the identity.
         first_boxes
             Boxes of the first step. Without a ``first_pose``, they determine the first pose.
         settings

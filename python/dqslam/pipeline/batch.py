@@ -16,6 +16,7 @@ from dqslam.association import (
     estimate_all_images,
     fill_in,
 )
+from dqslam.association.noise import StepNoise
 from dqslam.calibration import CalibrationFinding, check_calibration
 from dqslam.estimate import Estimate
 from dqslam.graph import Graph, solve
@@ -80,6 +81,9 @@ def estimate_batch(
         evidence=None if final is None else describe_evidence(final, estimate.initial_poses),
         remarks=found.remarks,
         calibration=findings,
+        took_part=np.isin(seen.pose, found.keyframes if final is None else final.images)
+        & ~found.repeats,
+        step_covariance=_step_covariance(recording, found) if tells_noise else None,
     )
 
 
@@ -160,6 +164,21 @@ def _finish(
         with contextlib.suppress(RuntimeError, ValueError):
             findings = check_calibration(graph, solved, solver)
     return estimate, marginals, summary, findings, final
+
+
+def _step_covariance(recording: Recording, found: Association) -> NDArray[np.float64] | None:
+    """Return the covariance of each step that is believed in the end, (n - 1, k, k).
+
+    None where it was not estimated.
+    """
+    scene, count = found.scene, len(recording.timestamps)
+    if scene.step_noise is None:
+        return None
+    every = np.arange(count)
+    steps = StepNoise.between(recording, every)
+    motion = np.searchsorted(found.keyframes, every[:-1], side="right") - 1
+    inflation = scene.inflation[motion.clip(0, len(scene.inflation) - 1)]
+    return steps.covariance(scene.levels, inflation)
 
 
 def _use_all_images(

@@ -14,6 +14,7 @@ from dqslam.assumptions import BoxNoise, OdometryNoise, SizePrior, SizePriors
 from dqslam.calibration import CalibrationFinding
 from dqslam.estimate import Estimate
 from dqslam.evaluation import trajectory_error
+from dqslam.graph import Graph
 from dqslam.io import Trajectory
 from dqslam.pipeline.hold_out import describe_overlap, overlap_with_map
 from dqslam.pipeline.lens import detections_with_exact_boxes
@@ -85,6 +86,11 @@ class EstimatorOutput:
     """Of a session, before its last polish: world_from_robot, shape (n, d)."""
     step_ms: Floats | None = None
     """Of a session: wall clock of each step, shape (n,)."""
+    took_part: Bools | None = None
+    """Boxes of the images that were estimated together, shape (m,); None for all boxes."""
+    step_covariance: Floats | None = None
+    """Covariance of each step, (n - 1, k, k), where it was estimated in more detail than by
+    ``odometry_noise``."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,6 +110,9 @@ class RunResult:
     """How the solver got there; None without objects."""
     report: dict[str, Any]
     """What report.json holds, in units that its keys name."""
+    graph: Graph | None = None
+    """The problem of the mapped objects' boxes, for a solve together with other recordings; None
+    where there is none, see ``kept_problem``."""
 
 
 def conclude(

@@ -13,9 +13,11 @@ from dqslam._files import write_text
 from dqslam._outputs import output_set
 from dqslam.association import FINAL
 from dqslam.inspection import FATAL, first_findings
+from dqslam.io.results import GRAPH_FILE, write_graph
 from dqslam.io.results.save import write_estimate
 from dqslam.pipeline.conclude import RunResult
 from dqslam.pipeline.options import Progress, RunFilesOptions
+from dqslam.pipeline.problem import kept_options
 from dqslam.pipeline.recording import run
 from dqslam.recording import Recording
 from dqslam.simulation import perturb_odometry
@@ -53,9 +55,9 @@ def run_files(
         to it, if any was.
     out
         Directory to write the results into: trajectory.txt, odometry.txt, map.json, boxes.csv,
-        covariance.csv, camera.json, report.json, and manifest.json with their SHA-256. It must be
-        new, empty, or of an earlier run, whose files all go at once when the new ones are there;
-        by default nothing is written.
+        covariance.csv, camera.json, graph.npz, report.json, and manifest.json with their SHA-256.
+        It must be new, empty, or of an earlier run, whose files all go at once when the new ones
+        are there; by default nothing is written.
     beside
         Texts to write with them, by the names of their files.
 
@@ -96,7 +98,7 @@ def run_files(
             progress=progress,
         )
         if folder is not None:
-            _save(result, folder, beside or {})
+            _save(result, folder, beside or {}, options)
     return result
 
 
@@ -236,9 +238,14 @@ def _describe(options: RunFilesOptions) -> dict[str, Any]:
     }
 
 
-def _save(result: RunResult, folder: Path, beside: Mapping[str, str]) -> None:
+def _save(
+    result: RunResult, folder: Path, beside: Mapping[str, str], options: RunFilesOptions
+) -> None:
     """Write all files of a result into an empty folder."""
     write_estimate(result.estimate, folder, result.detections, result.held_out, result.marginals)
+    if result.graph is not None:
+        solver = kept_options(options)
+        write_graph(folder / GRAPH_FILE, result.graph, result.estimate, solver)
     io.write_json(folder / "report.json", result.report)
     for name, text in beside.items():
         write_text(folder / name, text)

@@ -59,6 +59,7 @@ def estimate_online(
         odometry_noise=slam.odometry_noise,
         live_poses=live_poses,
         step_ms=np.array(step_ms),
+        took_part=np.isin(recording.detections.pose, slam.keyframes),
     )
 
 

@@ -22,6 +22,7 @@ from dqslam.pipeline.measurements import usable_measurements, with_measurements
 from dqslam.pipeline.online import estimate_online
 from dqslam.pipeline.options import Progress, RunOptions
 from dqslam.pipeline.placements import with_placements
+from dqslam.pipeline.problem import kept_problem
 from dqslam.pipeline.shapes import with_shapes
 from dqslam.recording import Recording
 
@@ -115,9 +116,11 @@ def run(
     shift[~held_out] = calibrated.detections.box - known.detections.box
     corrected = replace(boxes, box=boxes.box + shift)
     result = conclude(output, corrected, held_out, options, reference)
+    graph = kept_problem(output, calibrated, options.mode)
     shown = result.detections
     return replace(
         result,
         estimate=replace(result.estimate, camera=camera),
         detections=replace(shown, box=shown.box - shift - np.tile(offset, 2)),
+        graph=graph,
     )

@@ -41,6 +41,10 @@ class SeenMap:
     """Shape (o, 9)."""
     log_size: Floats
     """Mean logarithm of the semi-axes, and its sigma, shape (o, 2)."""
+    log_axes: Floats
+    """Logarithms of the semi-axes, descending, shape (o, 3)."""
+    log_axes_sigmas: Floats
+    """Their sigmas, shape (o, 3)."""
     sensor: Sensor | None
     """None without boxes: nobody knows then where the cameras looked."""
     camera: _core.Camera
@@ -84,7 +88,8 @@ class SeenMap:
         upright = find_up(poses)
         moved = _moved(objects, rows, common_from_map)
         covariances = ellipsoid_covariances(moved, np.arange(len(rows)))
-        sigma = np.sqrt((np.nan_to_num(moved.log_semi_axes_sigmas, nan=0.1) ** 2).sum(axis=1)) / 3
+        sigmas = np.nan_to_num(moved.log_semi_axes_sigmas, nan=0.1)
+        sigma = np.sqrt((sigmas**2).sum(axis=1)) / 3
         return cls(
             object_ids=moved.object_ids,
             class_names=names,
@@ -92,6 +97,8 @@ class SeenMap:
             center_covariances=covariances[:, :3, :3],
             ellipsoids=moved.ellipsoids,
             log_size=np.column_stack([np.log(moved.semi_axes).mean(axis=1), sigma]),
+            log_axes=np.log(moved.semi_axes),
+            log_axes_sigmas=sigmas,
             sensor=sensor,
             camera=results.camera,
             poses=poses,

@@ -14,6 +14,7 @@ import numpy as np
 
 from dqslam._checks import Floats, Ints
 from dqslam.places.changes_map import SeenMap, missed
+from dqslam.places.changes_sizes import SizeErrors, learned_errors, log_size_ratio, usual_errors
 
 # Prior probabilities: an object stays, moves, vanishes; one of the second map is new.
 STAYS, MOVES, VANISHES, APPEARS = 0.7, 0.1, 0.1, 0.1
@@ -24,9 +25,8 @@ MOVED_M, ANYWHERE = 0.8, 0.005
 # The share of objects that stay on what they stand on, and the sigmas of heights [m]: theirs,
 # beside the covariance, and that of the others.
 ON_SURFACE, SURFACE_M, OTHER_SURFACE_M = 0.85, 0.03, 0.4
-# Spread of the logarithm of the size of an object between two maps, and between objects of a class,
-# which the maps' own objects show; the number of objects as which the assumed spread counts.
-SIZE_SIGMA, CLASS_SIGMA, CLASS_COUNT = 0.15, 0.4, 3.0
+# An object that stayed with at least this probability shows how well sizes are repeated.
+CERTAIN = 0.95
 # Probability of another class for the same object, if no boxes show how often that happens.
 CONFUSED = 0.02
 # Share of errors of stayed objects that are larger, and how many times.
@@ -57,9 +57,24 @@ def match_maps(
     ``looks_in_second`` (a,) are the boxes that objects of the first map should have had in the
     second, ``looks_in_first`` (b,) likewise.
     """
+    errors = usual_errors(first, second)
+    found = _match(first, second, errors, looks_in_second, looks_in_first)
+    rows = np.flatnonzero((found.second >= 0) & (found.stayed > CERTAIN))
+    certain = np.column_stack([rows, found.second[rows]])
+    errors = learned_errors(first, second, certain, errors)
+    return _match(first, second, errors, looks_in_second, looks_in_first)
+
+
+def _match(
+    first: SeenMap,
+    second: SeenMap,
+    errors: SizeErrors,
+    looks_in_second: Floats,
+    looks_in_first: Floats,
+) -> Assignment:
     from scipy.optimize import linear_sum_assignment
 
-    stay, move = _log_same(first, second)
+    stay, move = _log_same(first, second, errors)
     unseen = missed(looks_in_second)
     unseen_before = missed(looks_in_first)
     extent = np.ptp(np.vstack([first.centers, second.centers]), axis=0) + 1.0
@@ -67,7 +82,8 @@ def match_maps(
     stay = stay + np.log(STAYS)
     move = move + np.log(MOVES)
     alone = np.log(VANISHES + MOVES * unseen_mean(unseen) + STAYS * unseen)
-    new = np.log(APPEARS + STAYS * unseen_before) - log_volume
+    # As many objects as the second map has may be new, anywhere in the place.
+    new = np.log(APPEARS + STAYS * unseen_before) + np.log(len(second)) - log_volume
     gain = np.maximum(stay, move) - alone[:, None] - new[None, :]
     rows, columns = linear_sum_assignment(np.maximum(gain, 0.0), maximize=True)
     match = np.full(len(first), -1)
@@ -105,7 +121,7 @@ def _probabilities(
     return Assignment(match, stayed, moved, vanished, appeared)
 
 
-def _log_same(first: SeenMap, second: SeenMap) -> tuple[Floats, Floats]:
+def _log_same(first: SeenMap, second: SeenMap, errors: SizeErrors) -> tuple[Floats, Floats]:
     """Return log densities of the second map's place and size of an object: stayed, moved.
 
     Relative to the density of sizes of the class; shape (a, b).
@@ -124,26 +140,9 @@ def _log_same(first: SeenMap, second: SeenMap) -> tuple[Floats, Floats]:
     extent = np.ptp(np.vstack([first.centers, second.centers]), axis=0) + 1.0
     anywhere = np.log(ANYWHERE) - np.log(extent.prod())
     move = np.logaddexp(np.log1p(-ANYWHERE) + near, anywhere)
-    change = second.log_size[None, :, 0] - first.log_size[:, None, 0]
-    variance = first.log_size[:, None, 1] ** 2 + second.log_size[None, :, 1] ** 2 + SIZE_SIGMA**2
-    size = -0.5 * change**2 / variance - 0.5 * np.log(variance)
-    # Two different objects of a class differ by its spread, twice.
-    other = variance + 2.0 * _class_variance(first, second)
-    size -= -0.5 * change**2 / other - 0.5 * np.log(other)
+    size = log_size_ratio(first, second, errors)
     labels = _log_class(first, second)
     return stay + size + labels, move + size + labels
-
-
-def _class_variance(first: SeenMap, second: SeenMap) -> float:
-    """Return the variance of the logarithms of sizes among the objects of a class, in one map."""
-    squares, free = CLASS_COUNT * CLASS_SIGMA**2, CLASS_COUNT
-    for one in (first, second):
-        names = np.array(one.class_names)
-        for name in sorted(set(one.class_names)):
-            own = one.log_size[names == name, 0]
-            squares += float(((own - own.mean()) ** 2).sum())
-            free += len(own) - 1
-    return squares / free
 
 
 def _log_displacement(difference: Floats, covariance: Floats, up: Floats | None) -> Floats:

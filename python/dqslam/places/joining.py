@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,9 +16,19 @@ from dqslam._repr import counted
 from dqslam.io.results import Results
 from dqslam.places.alignment import Alignment, CannotTellError
 from dqslam.places.consensus import MotionName, align_landmarks
-from dqslam.places.fusion import fuse
+from dqslam.places.fusion import Fused, fuse
 from dqslam.places.landmarks import Landmarks, Source, read_landmarks
 from dqslam.places.merged_files import write_merged
+from dqslam.places.together import (
+    Paths,
+    Solved,
+    joined_ids,
+    motion_of_part,
+    paths_of,
+    solve_maps,
+    solved_of,
+    why_not_together,
+)
 
 WRITTEN_BY = "dqslam merge"
 
@@ -46,6 +56,9 @@ class Part:
     """The same by its odometry alone."""
     pose_covariances: Floats
     """Of its poses in their own frames, m and rad, shape (n, 6, 6); NaN if unknown."""
+    why_fused: str = ""
+    """Why its problem was not solved together with those before, but its map fused with theirs;
+    empty if it was solved together, and for the first map."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +69,8 @@ class MergedMap:
     """All objects in the frame of the first map, each once."""
     parts: tuple[Part, ...]
     """The maps in the order in which they were merged."""
+    solved: Solved | None = None
+    """The problem of all maps, and its solution; None if a map was fused."""
 
     def __repr__(self) -> str:
         """Show how many objects there are, of how many maps."""
@@ -73,11 +88,15 @@ def merge(
     """Merge maps of one place: align them, join what is in several, and keep all trajectories.
 
     The frame is that of the first map, and its objects keep their ids. Another map is merged as
-    soon as it can be aligned with those before. An object that several maps have is where their
-    covariances weigh it, with a covariance that knows that the errors of one map are alike.
-    Its size and orientation are those of the map that knows them best. Trajectories are moved as
-    they are: the graphs of the recordings, which folders of results do not have, are not solved
-    again.
+    soon as it can be aligned with those before, one with a problem before one without. An object
+    that several maps have is where their covariances weigh it, with a covariance that knows that
+    the errors of one map are alike.
+    Its size and orientation are those of the map that knows them best.
+
+    Folders of results with a ``graph.npz`` are solved again as one problem, as by ``merge_graphs``,
+    if they have one camera: objects of several maps are one variable, and all trajectories are
+    corrected. Other maps are fused with these afterwards by the covariances in their files, and
+    their trajectories are moved as they are. ``Part.why_fused`` says why.
 
     Parameters
     ----------
@@ -105,28 +124,30 @@ def merge(
     if len(maps) < 2:
         raise ValueError(f"merge: {counted(len(maps), 'map')}, at least 2 are needed")
     read = [one if isinstance(one, Landmarks) else read_landmarks(one) for one in maps]
-    merged, parts, waiting = read[0], [_first(read[0])], read[1:]
+    problems = {id(one): solved_of(one) for one in read}
+    solved, why = problems[id(read[0])]
+    merged = MergedMap(read[0], (_first(read[0]),), solved)
+    waiting = sorted(read[1:], key=lambda one: problems[id(one)][0] is None)
     while waiting:
         refused: list[str] = []
         for landmarks in waiting:
             try:
-                merged, part = _add(merged, landmarks, motion, sigma)
+                merged = _add(merged, why, landmarks, problems[id(landmarks)], motion, sigma)
             except CannotTellError as error:
                 refused.append(f"{landmarks.name} cannot be aligned with the others: {error}")
                 continue
-            parts.append(part)
+            why = why or merged.parts[-1].why_fused
             waiting = [one for one in waiting if one is not landmarks]
             break
         else:
             raise CannotTellError("; ".join(refused))
-    result = MergedMap(merged, tuple(parts))
     if out is not None:
         inputs = [one for one in maps if isinstance(one, str | Path)]
         with output_set(out, WRITTEN_BY, inputs=inputs) as folder:
-            write_merged(result, folder)
+            write_merged(merged, folder)
             for name, text in (beside or {}).items():
                 write_text(folder / name, text)
-    return result
+    return merged
 
 
 def _first(landmarks: Landmarks) -> Part:
@@ -146,10 +167,68 @@ def _first(landmarks: Landmarks) -> Part:
 
 
 def _add(
-    merged: Landmarks, landmarks: Landmarks, motion: MotionName, sigma: float | None
-) -> tuple[Landmarks, Part]:
-    alignment, refined = align_landmarks(merged, landmarks, motion=motion, sigma=sigma)
-    fused = fuse(merged, landmarks, alignment, refined)
+    merged: MergedMap,
+    why: str,
+    landmarks: Landmarks,
+    problem: tuple[Solved | None, str],
+    motion: MotionName,
+    sigma: float | None,
+) -> MergedMap:
+    """Add a map to those before; ``why`` says why these have no problem, if they have none."""
+    before = merged.landmarks
+    solved, own_why = problem
+    alignment, refined = align_landmarks(before, landmarks, motion=motion, sigma=sigma)
+    why = why or own_why
+    if merged.solved is not None and solved is not None:
+        why = why_not_together(merged.solved, solved, alignment)
+        if not why:
+            try:
+                return _solve(merged, landmarks, solved, alignment)
+            except (ValueError, RuntimeError) as error:
+                why = f"the joint problem was not solved: {error}"
+    fused = fuse(before, landmarks, alignment, refined)
+    part = _fused_part(landmarks, alignment, fused)
+    return MergedMap(fused.landmarks, (*merged.parts, replace(part, why_fused=why)))
+
+
+def _solve(
+    merged: MergedMap, landmarks: Landmarks, second: Solved, alignment: Alignment
+) -> MergedMap:
+    """Add a map by solving its problem together with that of the maps before."""
+    assert merged.solved is not None
+    name = f"{merged.landmarks.name} and {landmarks.name}"
+    solved, together, joint = solve_maps(merged.solved, second, alignment, name)
+    paths, begin = paths_of(joint), 0
+    parts = []
+    for part in merged.parts:
+        mapped = np.isin(part.merged_ids, together.object_ids)
+        kept = replace(part, object_ids=part.object_ids[mapped], merged_ids=part.merged_ids[mapped])
+        parts.append(_with_poses(kept, paths, begin))
+        begin += len(part.poses)
+    object_ids, merged_ids = joined_ids(joint, second)
+    added = replace(
+        _first(landmarks), alignment=alignment, object_ids=object_ids, merged_ids=merged_ids
+    )
+    parts.append(_with_poses(added, paths, begin))
+    return MergedMap(together, tuple(parts), solved)
+
+
+def _with_poses(part: Part, paths: Paths, begin: int) -> Part:
+    """Return a part with its poses in a joint solution, which begin at a row."""
+    assert part.results is not None
+    matrix, covariance = motion_of_part(paths, part.results.poses, begin)
+    rows = slice(begin, begin + len(part.poses))
+    return replace(
+        part,
+        merged_from_map=matrix,
+        covariance=covariance,
+        poses=paths.poses[rows],
+        initial_poses=paths.initial_poses[rows],
+        pose_covariances=paths.covariances[rows],
+    )
+
+
+def _fused_part(landmarks: Landmarks, alignment: Alignment, fused: Fused) -> Part:
     results = landmarks.results
     inverse = np.asarray(np.linalg.inv(alignment.b_from_a), dtype=np.float64)
     poses, initial = np.zeros((0, 7)), np.zeros((0, 7))
@@ -157,7 +236,7 @@ def _add(
     if results is not None and len(results.poses):
         poses, initial = (_moved(inverse, x) for x in (results.poses, results.initial_poses))
         covariances = _moved_covariances(poses, results.covariances, fused.covariance)
-    return fused.landmarks, Part(
+    return Part(
         name=landmarks.name,
         alignment=alignment,
         object_ids=landmarks.object_ids,

@@ -12,13 +12,18 @@ from dqslam.estimate import Estimate
 from dqslam.graph import Graph, solve
 from dqslam.places.alignment import Alignment
 from dqslam.places.consensus import MotionName, align
+from dqslam.places.joint_tables import joined_tables, moved_ellipsoids, moved_poses, pose_of
 from dqslam.places.landmarks import landmarks_of
-from dqslam.subgraph import only_objects, rebuilt
+from dqslam.subgraph import only_objects
 from dqslam.uncertainty import Marginals, marginal_covariances
 
-# The second path begins anywhere [m, rad], as far as odometry says.
-_LOOSE = 1e3
 _GAP_S = 1.0  # between the times of two recordings that would overlap
+# Two estimates of one object are farther apart once in a thousand: chi-square, 3 degrees.
+ONE_PLACE_CHI2 = 16.27
+# A joined object of which fewer boxes of either recording fit is two objects.
+LEAST_FIT = 0.5
+# Solutions, each with the pairs that the one before has found, and without those it has refuted.
+MOST_ROUNDS = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,22 +82,99 @@ def merge_graphs(
     >>> dq.save_estimate(joint.estimate, "results/both", marginals=joint.marginals)
     """
     both = (first, second)
-    _check(first[0], second[0])
+    why = why_apart(first[0], second[0])
+    if why:
+        raise ValueError(f"merge_graphs: {why}")
     options = _core.SolveOptions() if options is None else options
-    model = first[0].core.pose_model
-    plane = model == _core.PoseModel.SE2
+    plane = first[0].core.pose_model == _core.PoseModel.SE2
     maps = [landmarks_of(one[1], marginal_covariances(*one, options).objects) for one in both]
     found = align(*maps, motion=motion or ("se2" if plane else "auto"))
+    return solve_together(first, second, found, options)
+
+
+def why_apart(a: Graph, b: Graph) -> str:
+    """Return why two problems cannot be one, or nothing if they can."""
+    if a.core.pose_model != b.core.pose_model:
+        names = (a.core.pose_model.name, b.core.pose_model.name)
+        return f"poses in {names[0]} and in {names[1]}, one kind is needed"
+    for name in ("fx", "fy", "cx", "cy", "width", "height"):
+        one, other = (getattr(x.core.camera, name) for x in (a, b))
+        if one != other:
+            return f"the cameras differ, {name} is {one:g} and {other:g}"
+    if not np.array_equal(a.core.camera.robot_from_camera, b.core.camera.robot_from_camera):
+        return "the mounts of the cameras differ"
+    if a.lens != b.lens or not np.array_equal(a.core.camera.distortion, b.core.camera.distortion):
+        return "the lenses of the cameras differ"
+    if any(shape != _core.Shape.ELLIPSOID for one in (a, b) for shape in one.core.shapes):
+        return "an object is a cuboid or a cylinder, and only ellipsoids are solved together"
+    return ""
+
+
+def solve_together(
+    first: tuple[Graph, Estimate],
+    second: tuple[Graph, Estimate],
+    found: Alignment,
+    options: _core.SolveOptions,
+) -> JointMap:
+    """Solve two problems as one from the alignment of their maps, see ``merge_graphs``.
+
+    With the solution, maps are known better than before: objects of both that it takes to one place
+    are joined as well, and all is solved again.
+    """
     a, b = (_mapped(*one) for one in (first, second))
-    start_a, start_b = first[1], second[1]
-    row_of_b, merged_ids = _rows(a, b, found)
+    pairs = np.column_stack(
+        [np.searchsorted(a.object_ids, found.a_ids), np.searchsorted(b.object_ids, found.b_ids)]
+    )
+    starts, joint = (first[1], second[1]), None
+    refuted = np.zeros((0, 2), dtype=np.int64)
+    for _ in range(MOST_ROUNDS):
+        joint = _solve_pairs(a, b, starts, found, pairs, options)
+        fits = _fit_both(joint, a, pairs)
+        refuted = np.concatenate([refuted, pairs[~fits]])
+        more = _more_pairs(joint, a, b, pairs, refuted, options)
+        if fits.all() and not len(more):
+            break
+        pairs = np.concatenate([pairs[fits], more])
+    assert joint is not None
+    return joint
+
+
+def _fit_both(joint: JointMap, a: Graph, pairs: Ints) -> Bools:
+    """Return whether the boxes of both recordings fit the object of each pair, (p,).
+
+    If two objects were taken for one, it is where one of them is, and does not fit the boxes of the
+    other.
+    """
+    boxes, inliers = joint.graph.core.boxes, joint.estimate.inliers
+    is_second = boxes.pose >= a.core.num_poses
+    rows = pairs[:, 0]
+    fits = np.ones(len(pairs), dtype=np.bool_)
+    for part in (is_second, ~is_second):
+        count = np.bincount(boxes.object[part], minlength=len(joint.graph.object_ids))
+        good = np.bincount(boxes.object[part & inliers], minlength=len(count))
+        fits &= good[rows] >= LEAST_FIT * count[rows]
+    return fits
+
+
+def _solve_pairs(
+    a: Graph,
+    b: Graph,
+    starts: tuple[Estimate, Estimate],
+    found: Alignment,
+    pairs: Ints,
+    options: _core.SolveOptions,
+) -> JointMap:
+    model, (start_a, start_b) = a.core.pose_model, starts
+    row_of_b, merged_ids = _rows(a, b, pairs)
     count = len(a.object_ids)
     new = row_of_b >= count
-    frame = _pose(np.asarray(np.linalg.inv(found.b_from_a), dtype=np.float64), model)
-    poses = np.concatenate([start_a.poses, _moved(frame, start_b.poses, model)])
-    initial = np.concatenate([a.core.initial_poses, _moved(frame, b.core.initial_poses, model)])
-    core = _joined(a.core, b.core, poses, initial, row_of_b, new)
-    shift = max(float(a.timestamps[-1] + _GAP_S - b.timestamps[0]), 0.0)
+    frame = pose_of(np.asarray(np.linalg.inv(found.b_from_a), dtype=np.float64), model)
+    poses = np.concatenate([start_a.poses, moved_poses(frame, start_b.poses, model)])
+    initial = np.concatenate(
+        [a.core.initial_poses, moved_poses(frame, b.core.initial_poses, model)]
+    )
+    core = joined_tables(a.core, b.core, poses, initial, row_of_b, new)
+    shift = time_shift(float(a.timestamps[-1]), float(b.timestamps[0]))
     graph = Graph(
         core=core,
         timestamps=np.concatenate([a.timestamps, b.timestamps + shift]),
@@ -101,23 +183,77 @@ def merge_graphs(
         observations=np.bincount(core.boxes.object, minlength=count + int(new.sum())),
         lens=a.lens,
     )
-    moved = _moved_ellipsoids(start_b.ellipsoids[new], found.b_from_a)
+    moved = moved_ellipsoids(start_b.ellipsoids[new], found.b_from_a)
     state = _core.State(poses, np.concatenate([start_a.ellipsoids, moved]))
     estimate, summary = solve(graph, options, start=state)
     marginals = marginal_covariances(graph, estimate, options)
     return JointMap(graph, estimate, marginals, summary, found, merged_ids, shift)
 
 
-def _check(a: Graph, b: Graph) -> None:
-    if a.core.pose_model != b.core.pose_model:
-        names = (a.core.pose_model.name, b.core.pose_model.name)
-        raise ValueError(f"merge_graphs: poses in {names[0]} and in {names[1]}, one kind is needed")
-    for name in ("fx", "fy", "cx", "cy", "width", "height"):
-        one, other = (getattr(x.core.camera, name) for x in (a, b))
-        if one != other:
-            raise ValueError(f"merge_graphs: the cameras differ, {name} is {one:g} and {other:g}")
-    if not np.array_equal(a.core.camera.robot_from_camera, b.core.camera.robot_from_camera):
-        raise ValueError("merge_graphs: the mounts of the cameras differ")
+def _more_pairs(
+    joint: JointMap, a: Graph, b: Graph, pairs: Ints, refuted: Ints, options: _core.SolveOptions
+) -> Ints:
+    """Return rows of A and of B, (p, 2), of objects that the solution takes to one place.
+
+    They are of one class, not further apart than their joint covariance allows, and no other
+    object of the class is a candidate for either.
+    """
+    known, estimate = joint.graph.object_ids, joint.estimate
+    row_in_joint = np.searchsorted(known, joint.merged_ids)
+    alone_a = np.setdiff1d(np.arange(len(a.object_ids)), pairs[:, 0])
+    alone_b = np.setdiff1d(np.arange(len(b.object_ids)), pairs[:, 1])
+    mapped = np.isin(known, estimate.object_ids)
+    alone_a, alone_b = alone_a[mapped[alone_a]], alone_b[mapped[row_in_joint[alone_b]]]
+    landmarks = np.full((len(known), 9), np.nan)
+    landmarks[mapped] = estimate.ellipsoids
+    kept = Graph(
+        only_objects(joint.graph.core, mapped),
+        joint.graph.timestamps,
+        known[mapped],
+        estimate.class_names,
+        joint.graph.observations[mapped],
+    )
+    state = _core.State(estimate.poses, estimate.ellipsoids)
+    row_kept = np.cumsum(mapped) - 1
+    candidates: list[tuple[int, int]] = []
+    for row in alone_a.tolist():
+        for other in alone_b.tolist():
+            is_refuted = (refuted == [row, other]).all(axis=1).any()
+            if is_refuted or a.class_names[row] != b.class_names[other]:
+                continue
+            there = int(row_in_joint[other])
+            apart = landmarks[row] - landmarks[there]
+            spread = joint.marginals.centers[[row_kept[row], row_kept[there]]]
+            # Correlated or not, the variance of a difference is at most twice the sum of both.
+            if apart[:3] @ np.linalg.solve(2.0 * spread.sum(axis=0), apart[:3]) > ONE_PLACE_CHI2:
+                continue
+            rows = [int(row_kept[row]), int(row_kept[there])]
+            both = _core.joint_covariance(kept.core, options, state, [], rows)
+            own, cross = both[:9, :9] + both[9:, 9:], both[:9, 9:]
+            covariance = own - cross - cross.T
+            if _fits(apart, covariance, landmarks[[row, there]]):
+                candidates.append((row, other))
+    table = np.array(candidates, dtype=np.int64).reshape(-1, 2)
+    single = [np.unique(side, return_counts=True) for side in table.T]
+    once = [values[counts == 1] for values, counts in single]
+    return table[np.isin(table[:, 0], once[0]) & np.isin(table[:, 1], once[1])]
+
+
+def _fits(apart: Floats, covariance: Floats, ellipsoids: Floats) -> bool:
+    """Return whether two ellipsoids (2, 9) are one, from their difference and its covariance."""
+    chi2 = apart[:3] @ np.linalg.solve(covariance[:3, :3], apart[:3])
+    axes = np.array([_core.axes_from_ellipsoid(one)[1] for one in ellipsoids])
+    # Nothing is farther from itself than it is large.
+    near = np.linalg.norm(apart[:3]) < axes[:, 0].sum()
+    return bool(near and chi2 < ONE_PLACE_CHI2)
+
+
+def time_shift(end: float, begin: float) -> float:
+    """Return what is added to the times of a recording so that it begins after the end of another.
+
+    Seconds; 0 if it does.
+    """
+    return end + _GAP_S - begin if begin <= end else 0.0
 
 
 def _mapped(graph: Graph, estimate: Estimate) -> Graph:
@@ -132,90 +268,11 @@ def _mapped(graph: Graph, estimate: Estimate) -> Graph:
     )
 
 
-def _rows(a: Graph, b: Graph, found: Alignment) -> tuple[Ints, Ints]:
+def _rows(a: Graph, b: Graph, pairs: Ints) -> tuple[Ints, Ints]:
     """Return the row and the id in the joint problem of each object of B, (o,)."""
     row_of_b = np.full(len(b.object_ids), -1)
-    row_of_b[np.searchsorted(b.object_ids, found.b_ids)] = np.searchsorted(
-        a.object_ids, found.a_ids
-    )
+    row_of_b[pairs[:, 1]] = pairs[:, 0]
     alone = np.flatnonzero(row_of_b < 0)
     row_of_b[alone] = len(a.object_ids) + np.arange(len(alone))
     ids = np.concatenate([a.object_ids, a.object_ids.max() + 1 + np.arange(len(alone))])
     return row_of_b, ids[row_of_b]
-
-
-def _joined(
-    a: _core.Graph, b: _core.Graph, poses: Floats, initial: Floats, row_of_b: Ints, new: Bools
-) -> _core.Graph:
-    """Return the tables of both, one after the other."""
-    before = a.num_poses
-    k = round(a.odometry.covariance.shape[1] ** 0.5)
-    step = _core.between(a.pose_model, poses[before - 1 : before], poses[before : before + 1])
-    loose = np.diag(np.full(k, _LOOSE**2)).reshape(1, -1)
-    odometry = _core.OdometryTable(
-        from_pose=np.concatenate(
-            [a.odometry.from_pose, [before - 1], b.odometry.from_pose + before]
-        ),
-        to_pose=np.concatenate([a.odometry.to_pose, [before], b.odometry.to_pose + before]),
-        relative=np.concatenate([a.odometry.relative, step, b.odometry.relative]),
-        covariance=np.concatenate([a.odometry.covariance, loose, b.odometry.covariance]),
-    )
-    boxes = _core.BoxTable(
-        pose=np.concatenate([a.boxes.pose, b.boxes.pose + before]),
-        object=np.concatenate([a.boxes.object, row_of_b[b.boxes.object]]),
-        box=np.concatenate([a.boxes.box, b.boxes.box]),
-        covariance=np.concatenate([a.boxes.covariance, b.boxes.covariance]),
-        truncated=np.concatenate([a.boxes.truncated, b.boxes.truncated]),
-    )
-    prior = _core.SizePriorTable(
-        log_mean=np.concatenate([a.size_prior.log_mean, b.size_prior.log_mean[new]]),
-        log_sigma=np.concatenate([a.size_prior.log_sigma, b.size_prior.log_sigma[new]]),
-    )
-    moved = [
-        _core.MeasurementTable(
-            kind=table.kind,
-            pose=table.pose + before,
-            object=row_of_b[table.object],
-            value=table.value,
-            covariance=table.covariance,
-        )
-        for table in b.measurements
-    ]
-    return rebuilt(
-        a,
-        initial_poses=initial,
-        odometry=odometry,
-        boxes=boxes,
-        size_prior=prior,
-        measurements=[*a.measurements, *moved],
-    )
-
-
-def _pose(matrix: Floats, model: _core.PoseModel) -> Floats:
-    """Return a motion (4, 4) in the form of a pose, (d,)."""
-    from scipy.spatial.transform import Rotation
-
-    if model == _core.PoseModel.SE2:
-        return np.array([*matrix[:2, 3], np.arctan2(matrix[1, 0], matrix[0, 0])])
-    return np.concatenate([matrix[:3, 3], Rotation.from_matrix(matrix[:3, :3]).as_quat()])
-
-
-def _moved(frame: Floats, poses: Floats, model: _core.PoseModel) -> Floats:
-    return np.asarray(_core.compose(model, np.tile(frame, (len(poses), 1)), poses))
-
-
-def _moved_ellipsoids(ellipsoids: Floats, b_from_a: Floats) -> Floats:
-    """Return ellipsoids (o, 9) of B in the frame of A."""
-    from scipy.spatial.transform import Rotation
-
-    inverse = np.linalg.inv(b_from_a)
-    turn = Rotation.from_matrix(inverse[:3, :3])
-    moved = [
-        _core.ellipsoid_from_axes(
-            inverse[:3, :3] @ center + inverse[:3, 3],
-            axes,
-            (turn * Rotation.from_quat(orientation)).as_quat(),
-        )
-        for center, axes, orientation in map(_core.axes_from_ellipsoid, ellipsoids)
-    ]
-    return np.array(moved).reshape(-1, 9)

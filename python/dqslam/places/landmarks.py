@@ -134,7 +134,9 @@ def _of_objects(objects: MapObjects, name: str, results: Results | None) -> Land
     )
 
 
-def landmarks_of(estimate: Estimate, objects: Floats | None = None) -> Landmarks:
+def landmarks_of(
+    estimate: Estimate, objects: Floats | None = None, *, name: str = "estimate"
+) -> Landmarks:
     """Return the objects of an estimate, with their covariances (o, 9, 9) as in ``Marginals``."""
     count = len(estimate.object_ids)
     centers, sigmas = np.full((count, 3, 3), np.nan), np.full((count, 3), np.nan)
@@ -145,7 +147,7 @@ def landmarks_of(estimate: Estimate, objects: Floats | None = None) -> Landmarks
             jacobian = _core.log_semi_axes_jacobian(estimate.ellipsoids[row])
             sigmas[row] = np.sqrt(np.diagonal(jacobian @ objects[row] @ jacobian.T))
     return Landmarks(
-        name="estimate",
+        name=name,
         object_ids=estimate.object_ids,
         class_names=estimate.class_names,
         centers=estimate.centers,

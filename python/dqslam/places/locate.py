@@ -15,6 +15,7 @@ from dqslam.assumptions import OdometryNoise
 from dqslam.io import Results
 from dqslam.io.results import load_map_results
 from dqslam.lens import camera_with, lens_of
+from dqslam.places.landmarks import read_landmarks
 from dqslam.places.locate_boxes import LabeledBoxes, check_labels, label_boxes
 from dqslam.places.locate_map import ImageBoxes, PlaceMap
 from dqslam.places.locate_score import SE3, Frame
@@ -106,8 +107,8 @@ def locate(
     Parameters
     ----------
     known
-        The map: results, their folder, or ``PlaceMap.of(results)``, which saves time if many
-        images are located.
+        The map: results, their folder, a ``map.json`` or CSV of objects with sizes, or
+        ``PlaceMap.of(results)``, which saves time if many images are located.
     boxes
         Boxes in undistorted pixels. Ids of objects are not used. Boxes of different classes that
         overlap by an intersection over union of 0.8 count as one box with several labels.
@@ -147,7 +148,7 @@ def locate(
         raise ValueError(f"min_confidence is {min_confidence:g}, not between 0 and 1")
     if labels is not None:
         check_labels(labels, len(boxes))
-    place = known if isinstance(known, PlaceMap) else PlaceMap.of(_results(known))
+    place = known if isinstance(known, PlaceMap) else place_of(known)
     lens = lens_of(camera)
     bare = camera_with(camera, lens, robot_from_camera=(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0))
     images = np.unique(boxes.pose)
@@ -165,8 +166,13 @@ def locate(
     return _answer(place, places, labeled, len(boxes), last, min_confidence)
 
 
-def _results(known: Results | str | Path) -> Results:
-    return known if isinstance(known, Results) else load_map_results(known)
+def place_of(known: Results | str | Path) -> PlaceMap:
+    """Prepare a map: results, their folder, or a ``map.json`` or CSV of objects with sizes."""
+    if isinstance(known, Results):
+        return PlaceMap.of(known)
+    if Path(known).is_file():
+        return PlaceMap.of_landmarks(read_landmarks(known))
+    return PlaceMap.of(load_map_results(known))
 
 
 def _poses(images: Ints, odometry: ArrayLike | None) -> Floats:

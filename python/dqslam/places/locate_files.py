@@ -13,10 +13,8 @@ from dqslam import _core
 from dqslam import io as files
 from dqslam.io import FileError, Notes, ReadOptions
 from dqslam.io.files import write_text
-from dqslam.io.results import load_map_results
 from dqslam.lens import undistorted_or_nan
-from dqslam.places.locate import Location, locate
-from dqslam.places.locate_map import PlaceMap
+from dqslam.places.locate import Location, locate, place_of
 from dqslam.recording import Detections
 
 TABLE = "locations.csv"
@@ -68,7 +66,7 @@ def locate_files(
     """
     if not 0.0 <= min_score <= 1.0:
         raise ValueError(f"min_score is {min_score:g}, not between 0 and 1")
-    place = PlaceMap.of(load_map_results(known))
+    place = place_of(known)
     how = reading or ReadOptions()
     if odometry is not None:
         recording, _ = files.load_recording(

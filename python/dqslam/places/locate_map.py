@@ -11,9 +11,11 @@ import numpy as np
 
 from dqslam import _core
 from dqslam._checks import Bools, Floats, Ints
-from dqslam.io import Results
+from dqslam.io import MapObjects, Results
 from dqslam.io.results import ellipsoid_covariances
+from dqslam.io.results.map_covariances import UNKNOWN_LOG_SIGMA
 from dqslam.lens import cut_edges
+from dqslam.places.landmarks import Landmarks
 from dqslam.places.locate_upright import Upright, find_up
 from dqslam.places.sensor import Sensor, assumed_sensor, learn_sensor
 
@@ -23,6 +25,9 @@ _ASSUMED_SIGHT = 40.0
 _SIZE_SIGMA = 0.1
 # The ratio of the axes, as a logarithm, that becomes a part of that spread.
 _ASPECT_SHARE = 0.3
+# What is in view is around a point at this share of the sight ahead, within this share of it, and
+# is so many objects at most; objects around which they are counted.
+AHEAD, REACH, MOST_OBJECTS, _MOST_SAMPLES = 0.4, 0.6, 200, 500
 # Directions from which the map saw an object, at most.
 _MOST_DIRECTIONS = 32
 
@@ -80,12 +85,69 @@ class PlaceMap:
             seen_from=_seen_from(results, ids, ellipsoids),
         )
 
+    @classmethod
+    def of_landmarks(cls, landmarks: Landmarks) -> Self:
+        """Prepare objects alone, of a CSV or a ``map.json``: rates of detection are assumed.
+
+        An object of unknown orientation is a sphere of its mean semi-axis, whose size is as
+        uncertain as its axes differ.
+
+        Raises
+        ------
+        ValueError
+            If no object has a size, which its distance is known by.
+        """
+        rows = np.flatnonzero(np.isfinite(landmarks.semi_axes).all(axis=1))
+        if not rows.size:
+            raise ValueError(f"{landmarks.name}: no object has a size, which tells its distance")
+        axes, turns = landmarks.semi_axes[rows].copy(), landmarks.orientations[rows].copy()
+        sigmas = landmarks.log_semi_axes_sigmas[rows].copy()
+        sigmas[~np.isfinite(sigmas)] = UNKNOWN_LOG_SIGMA
+        is_turned = np.isfinite(turns).all(axis=1)
+        logs = np.log(axes[~is_turned])
+        axes[~is_turned] = np.exp(logs.mean(axis=1, keepdims=True))
+        sigmas[~is_turned] = np.hypot(sigmas[~is_turned], logs.std(axis=1, keepdims=True))
+        turns[~is_turned] = [0.0, 0.0, 0.0, 1.0]
+        objects = MapObjects(
+            object_ids=landmarks.object_ids[rows],
+            class_names=tuple(landmarks.class_names[row] for row in rows),
+            centers=landmarks.centers[rows],
+            semi_axes=axes,
+            orientations=turns,
+            dual_quadrics=np.full((len(rows), 9), np.nan),
+            observations=landmarks.observations[rows],
+            center_covariances=landmarks.covariances[rows],
+            log_semi_axes_sigmas=sigmas,
+        )
+        return cls(
+            object_ids=objects.object_ids,
+            class_names=objects.class_names,
+            ellipsoids=objects.ellipsoids,
+            covariances=ellipsoid_covariances(objects, np.arange(len(rows))),
+            sensor=assumed_sensor(objects.class_names, _ASSUMED_SIGHT * float(axes.mean())),
+            upright=None,
+            seen_from=np.full((len(rows), 0, 3), np.nan),
+        )
+
     @cached_property
     def tree(self) -> Any:
         """The centers of the objects, for search by place."""
         from scipy.spatial import cKDTree
 
         return cKDTree(self.ellipsoids[:, :3])
+
+    @cached_property
+    def in_reach(self) -> int:
+        """How many objects around a point ahead of a camera may be in its sight, 200 at most.
+
+        That is the number within ``REACH`` of the sight around an object, which one in twenty
+        exceeds.
+        """
+        centers = self.ellipsoids[:, :3]
+        some = centers[:: -(-len(centers) // _MOST_SAMPLES)]
+        radius = REACH * self.sensor.sight
+        counts = self.tree.query_ball_point(some, radius, return_length=True)
+        return min(int(np.quantile(counts, 0.95)) + 1, MOST_OBJECTS, len(centers))
 
     @cached_property
     def size(self) -> Floats:

@@ -5,14 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from dqslam._checks import Bools, Floats
-from dqslam.places.locate_hypotheses import Hypotheses, Pairings
-from dqslam.places.locate_map import ImageBoxes, PlaceMap
+from dqslam.places.locate_hypotheses import Hypotheses
+from dqslam.places.locate_map import AHEAD, MOST_OBJECTS, ImageBoxes, PlaceMap
+from dqslam.places.locate_pairs import Pairings
 
 # Sigma of the direction of a box's middle: constant [rad], and a share of its half side.
 _RAY_SIGMA, _RAY_SHARE = 0.015, 0.25
-# In a larger map, only the objects near each hypothesis are compared with its boxes: so many around
-# the point at this share of the sight ahead.
-MOST_OBJECTS, _AHEAD = 200, 0.4
 # Cells of a table that is made at once.
 _MOST_CELLS = 300_000
 
@@ -69,12 +67,12 @@ def _score_near(place: PlaceMap, pairings: Pairings, gain: Floats, found: Hypoth
     log_half = place.size[pairings.object_row[first], 0] - pairings.log_distance[first]
     sigma_ray = np.hypot(_RAY_SIGMA, _RAY_SHARE * np.exp(log_half))
     score = np.zeros(len(found.position))
-    chunk = max(1, _MOST_CELLS // (MOST_OBJECTS * len(boxes)))
+    chunk = max(1, _MOST_CELLS // (place.in_reach * len(boxes)))
     for start in range(0, len(score), chunk):
         part = slice(start, start + chunk)
         rotation, position = found.rotation[part], found.position[part]
-        ahead = position + _AHEAD * place.sensor.sight * rotation[:, :, 2]
-        _, rows = place.tree.query(ahead, k=MOST_OBJECTS)
+        ahead = position + AHEAD * place.sensor.sight * rotation[:, :, 2]
+        _, rows = place.tree.query(ahead, k=place.in_reach)
         inside = (place.ellipsoids[rows, :3] - position[:, None]) @ rotation
         distance = np.sqrt((inside**2).sum(axis=2))
         cosine = inside @ ray.T / distance[:, :, None]

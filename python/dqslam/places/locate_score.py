@@ -14,7 +14,7 @@ import numpy as np
 
 from dqslam import _core
 from dqslam._checks import Bools, Floats, Ints
-from dqslam.places.locate_map import ImageBoxes, PlaceMap
+from dqslam.places.locate_map import AHEAD, MOST_OBJECTS, ImageBoxes, PlaceMap
 from dqslam.places.visibility import view_objects
 
 SE3 = _core.PoseModel.SE3
@@ -25,8 +25,6 @@ WIDE_SHARE, WIDER = 0.1, 3.0
 _NEW_VIEW, _MOST_NEW = 0.5, 4.0
 # Factors of the rates of detection in an image, and their shares of images.
 QUALITIES = ((1.0, 0.5), (0.6, 0.3), (0.3, 0.2))
-# Objects of a large map that are compared at a pose.
-_MOST_OBJECTS = 200
 # Boxes farther than this from a prediction, in sides of both, do not show the object.
 _GATE, _GATE_PX = 1.0, 20.0
 _LOG_2PI = float(np.log(2.0 * np.pi))
@@ -152,13 +150,13 @@ class Scorer:
     def _objects_near(self, at: Floats) -> Ints:
         """Return the rows of objects near each camera, (h, s): all in a small map."""
         count = len(self.place.ellipsoids)
-        if count <= _MOST_OBJECTS:
+        if count <= MOST_OBJECTS:
             return np.tile(np.arange(count), (len(at), 1))
         # A point ahead is nearer to what is in view than the camera itself.
         forward = _core.compose(
-            SE3, at, np.tile([0, 0, 0.4 * self.place.sensor.sight, 0, 0, 0, 1.0], (len(at), 1))
+            SE3, at, np.tile([0, 0, AHEAD * self.place.sensor.sight, 0, 0, 0, 1.0], (len(at), 1))
         )
-        _, rows = self.place.tree.query(forward[:, :3], k=_MOST_OBJECTS)
+        _, rows = self.place.tree.query(forward[:, :3], k=self.place.in_reach)
         return np.sort(rows, axis=1)
 
     def _possible(

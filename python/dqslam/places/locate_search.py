@@ -8,9 +8,10 @@ import numpy as np
 
 from dqslam import _core
 from dqslam._checks import Bools, Floats, Ints
-from dqslam.places.locate_hypotheses import Hypotheses, find_hypotheses, pair_up
-from dqslam.places.locate_map import PlaceMap
-from dqslam.places.locate_quick import MOST_OBJECTS, quick_score
+from dqslam.places.locate_hypotheses import Hypotheses, find_hypotheses
+from dqslam.places.locate_map import MOST_OBJECTS, PlaceMap
+from dqslam.places.locate_pairs import pair_up
+from dqslam.places.locate_quick import quick_score
 from dqslam.places.locate_score import SE3, Frame, Matches, Scored, Scorer
 
 # Hypotheses of each image that are compared with its boxes quickly, in a small and in a large map,
@@ -20,6 +21,12 @@ _MOST_QUICK, _MOST_QUICK_LARGE, _MOST_SCORED = 4000, 500, 24
 _MOST_REFINED = (24, 8, 8)
 # Poses as near as this lead to the same: a share of the sight, and radians.
 _SAME_SHARE, _SAME_ANGLE = 0.03, 0.1
+# Side of the cells in which similar hypotheses are counted, and the number of grids; what makes
+# one number of the nine of a cell.
+_CELL, _GRIDS = 2.0, 6
+_HASH = np.array(
+    [73856093, 19349663, 83492791, 49979687, 86028121, 67867967, 32452843, 15485863, 1]
+)
 # Poses as near as this are one answer.
 _ONE_SHARE, _ONE_ANGLE = 0.12, 0.25
 
@@ -144,8 +151,10 @@ def _starts(place: PlaceMap, camera: _core.Camera, frame: Frame) -> Floats:
     image = frame.boxes
     pairings = pair_up(place, camera, image)
     whole = np.asarray(~image.truncated.any(axis=1))
-    most = _MOST_QUICK if len(place.ellipsoids) <= MOST_OBJECTS else _MOST_QUICK_LARGE
-    found = _strongest(find_hypotheses(pairings, whole, place.upright), place.sensor.sight, most)
+    is_large = len(place.ellipsoids) > MOST_OBJECTS
+    most = _MOST_QUICK_LARGE if is_large else _MOST_QUICK
+    found = find_hypotheses(pairings, whole, place.upright, is_large=is_large)
+    found = _strongest(found, place.sensor.sight, most)
     score = quick_score(place, image, pairings, found)
     if place.upright is not None:
         score += place.upright.log_prior(found.rotation)
@@ -159,14 +168,18 @@ def _starts(place: PlaceMap, camera: _core.Camera, frame: Frame) -> Floats:
 
 def _strongest(found: Hypotheses, sight: float, most: int) -> Hypotheses:
     """Return the hypotheses that most others are near to, if there are more than ``most``."""
-    from scipy.spatial import cKDTree
-
     count = len(found.position)
     if count <= most:
         return found
     where = np.hstack(
         [found.position / (0.1 * sight), found.rotation[:, :, 0] * 5, found.rotation[:, :, 2] * 5]
     )
-    near = cKDTree(where).query_ball_point(where, 1.0, return_length=True)
+    # How many share a cell, in grids that are shifted against each other.
+    near = np.zeros(count)
+    shifts = np.random.default_rng(0).uniform(0.0, _CELL, (_GRIDS, where.shape[1]))
+    for shift in shifts:
+        cells = np.floor((where + shift) / _CELL).astype(np.int64)
+        _, cell, counts = np.unique(cells @ _HASH, return_inverse=True, return_counts=True)
+        near += counts[cell.reshape(-1)]
     keep = np.argsort(-near, kind="stable")[:most]
     return Hypotheses(found.rotation[keep], found.position[keep])

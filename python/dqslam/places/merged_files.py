@@ -18,11 +18,12 @@ from dqslam import _core
 from dqslam._files import write_text
 from dqslam.io.camera.table import named_values, write_json_camera
 from dqslam.io.files import write_json
-from dqslam.io.results import Results
+from dqslam.io.results import GRAPH_FILE, Results, write_graph
 from dqslam.io.results.boxes import COLUMNS, EDGES
 from dqslam.io.results.covariances import write_rows
 from dqslam.io.trajectory import write_trajectory
 from dqslam.places.alignment import describe_alignment
+from dqslam.places.joint import time_shift
 
 if TYPE_CHECKING:
     from dqslam._checks import Floats
@@ -30,7 +31,6 @@ if TYPE_CHECKING:
     from dqslam.places.landmarks import Landmarks
 
 MERGE_FILE = "merge.json"
-_GAP_S = 1.0  # between the times of two trajectories that would overlap
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +69,9 @@ def write_merged(merged: MergedMap, folder: Path) -> None:
         ]
         if boxes_of:
             write_text(folder / "boxes.csv", _boxes(boxes_of))
+    solved = merged.solved
+    if solved is not None:
+        write_graph(folder / GRAPH_FILE, solved.graph, solved.estimate, solved.options)
     write_json(folder / MERGE_FILE, _describe(merged, drives, boxes_of))
 
 
@@ -78,9 +81,8 @@ def _drives(merged: MergedMap) -> list[_Drive]:
         results = part.results
         if results is None or not len(results.timestamps):
             continue
-        shift = 0.0
-        if drives and results.timestamps[0] <= drives[-1].times[-1]:
-            shift = float(drives[-1].times[-1] + _GAP_S - results.timestamps[0])
+        begin = float(results.timestamps[0])
+        shift = time_shift(float(drives[-1].times[-1]), begin) if drives else 0.0
         drives.append(_Drive(part, results, shift))
     return drives
 
@@ -159,9 +161,13 @@ def _describe(merged: MergedMap, drives: list[_Drive], boxes_of: list[_Drive]) -
                 "poses": 0 if drive is None else len(drive.times),
                 "time_shift_s": None if drive is None else drive.shift_s,
                 "boxes_kept": drive in boxes_of,
+                "why_fused": part.why_fused,
             }
         )
     return {
-        "method": "maps fused by their marginal covariances; trajectories moved as they are",
+        "method": "all recordings solved as one problem"
+        if merged.solved is not None
+        else "maps fused by their covariances, see why_fused of each; their trajectories are moved "
+        "as they are",
         "parts": parts,
     }

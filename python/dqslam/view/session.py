@@ -13,6 +13,7 @@ from dqslam._checks import Floats
 from dqslam._colors import object_colors
 from dqslam._files import FileError
 from dqslam.online import OnlineSlam, Step
+from dqslam.solids import Solids
 from dqslam.view.foxglove import Channels, check_times, foxglove_sdk
 from dqslam.view.scene import Scene, SceneBoxes, SceneObject
 
@@ -67,6 +68,7 @@ class SessionRecorder:
             pose_spreads=(),
             truth=(),
             objects=_objects(slam),
+            solids=Solids.of_ellipsoids(objects.ellipsoids),
             true_objects=(),
             boxes=SceneBoxes(
                 pose=np.full(len(box), len(poses) - 1),

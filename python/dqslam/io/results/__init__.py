@@ -12,10 +12,15 @@
                     ``dropped``: ``id reason``.
 ``covariance.csv``  Covariances of poses, see ``covariances``. Only when marginals are given.
 ``boxes.csv``       A row per box, used or left out, see ``boxes``. Only when boxes are given.
+``graph.npz``       The problem that was solved, see ``graph_file``. Only when it is given.
 ==================  ================================================================================
 """
 
 from dqslam.io.results.boxes import BoxTable as BoxTable
+from dqslam.io.results.graph_file import GRAPH_FILE as GRAPH_FILE
+from dqslam.io.results.graph_file import SavedGraph as SavedGraph
+from dqslam.io.results.graph_file import read_graph as read_graph
+from dqslam.io.results.graph_file import write_graph as write_graph
 from dqslam.io.results.load import MapObjects as MapObjects
 from dqslam.io.results.load import Results as Results
 from dqslam.io.results.load import load_map_results as load_map_results

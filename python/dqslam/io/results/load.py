@@ -20,6 +20,7 @@ from dqslam.io.camera import read_camera
 from dqslam.io.files import FileError, read_text
 from dqslam.io.results.boxes import BoxTable, read_boxes
 from dqslam.io.results.covariances import read_covariances
+from dqslam.io.results.graph_file import GRAPH_FILE
 from dqslam.io.results.save import NO_POSES
 from dqslam.io.trajectory import Trajectory, read_trajectory
 from dqslam.solids import Solids, body_solids
@@ -32,6 +33,7 @@ RESULT_FILES = (
     "covariance.csv",
     "boxes.csv",
     "report.json",
+    GRAPH_FILE,
 )
 _MOST_READINGS = 5
 

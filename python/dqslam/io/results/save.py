@@ -15,6 +15,7 @@ from dqslam.io.camera.table import write_json_camera
 from dqslam.io.files import write_json, write_text
 from dqslam.io.results.boxes import write_boxes
 from dqslam.io.results.covariances import write_covariances
+from dqslam.io.results.graph_file import GRAPH_FILE, Problem, write_graph
 from dqslam.io.trajectory import write_trajectory
 from dqslam.recording import Detections
 
@@ -41,6 +42,8 @@ def save_estimate(
     detections: Detections | None = None,
     held_out: Bools | None = None,
     marginals: Covariances | None = None,
+    graph: Problem | None = None,
+    options: _core.SolveOptions | None = None,
 ) -> None:
     """Write an estimate into a directory, which is created if needed.
 
@@ -60,6 +63,9 @@ def save_estimate(
     marginals
         Covariances of the poses, for ``covariance.csv``, and of the objects, which need the
         ellipsoid model.
+    graph, options
+        The problem that was solved, and the options of the solver, for ``graph.npz``. ``merge``
+        solves the problems of several such directories as one.
 
     Raises
     ------
@@ -83,6 +89,9 @@ def save_estimate(
     require(estimate, Estimate, "save_estimate", "save_estimate(estimate, directory)")
     with output_set(directory, "save_estimate", beside_others=True) as folder:
         write_estimate(estimate, folder, detections, held_out, marginals)
+        if graph is not None:
+            solved_with = _core.SolveOptions() if options is None else options
+            write_graph(folder / GRAPH_FILE, graph, estimate, solved_with)
 
 
 def write_estimate(
