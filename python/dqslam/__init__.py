@@ -20,6 +20,7 @@ if TYPE_CHECKING:  # the one list of public names, a line each: lazy_exports rea
     from dqslam import plot as plot
     from dqslam import simulation as simulation
     from dqslam import studies as studies
+    from dqslam import tracks as tracks
     from dqslam import view as view
     from dqslam._core import Backend as Backend
     from dqslam._core import Camera as Camera
@@ -112,6 +113,7 @@ if TYPE_CHECKING:  # the one list of public names, a line each: lazy_exports rea
     from dqslam.simulation import load_scenario as load_scenario
     from dqslam.simulation import simulate as simulate
     from dqslam.studies.paper import run_paper as run_paper
+    from dqslam.track import Track as Track
     from dqslam.uncertainty import Bound as Bound
     from dqslam.uncertainty import Marginals as Marginals
     from dqslam.uncertainty import UnderConstrained as UnderConstrained

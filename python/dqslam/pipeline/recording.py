@@ -19,6 +19,7 @@ from dqslam.pipeline.conclude import RunResult, conclude
 from dqslam.pipeline.hold_out import choose_held_out
 from dqslam.pipeline.lens import widened
 from dqslam.pipeline.measurements import usable_measurements, with_measurements
+from dqslam.pipeline.moving import with_tracks
 from dqslam.pipeline.online import estimate_online
 from dqslam.pipeline.options import Progress, RunOptions
 from dqslam.recording import Recording
@@ -106,6 +107,7 @@ def run(
         bare = replace(known, positions=None, measurements=(), absolute=None, closures=None)
         calibrated = known
         output = with_measurements(estimator(bare, options, progress), known, options)
+    output = with_tracks(output, replace(calibrated, detections=known.detections), options)
     output = replace(output, remarks=(*output.remarks, *remarks))
     # Boxes are judged as the calibration corrects them, and returned as they were given.
     shift = np.zeros((len(boxes), 4))
