@@ -15,7 +15,7 @@ from dqslam.tracks import Tracked
 def describe_tracks(
     tracked: Tracked | None, detections: Detections, timestamps: Floats
 ) -> dict[str, Any] | None:
-    """Describe what moves, and boxes of what rests or is unknown; None where nothing was looked for.
+    """Describe what moves, and boxes of what rests or is unknown; None where none was looked for.
 
     ``detections`` are those that the estimator was given, ``timestamps`` (n,) those of all poses.
     """
@@ -35,8 +35,10 @@ def describe_tracks(
     return {
         "ground": {
             "kind": tracked.ground.kind,
-            "sigma_m": tracked.ground.common_sigma,
-            "scatter_m": tracked.ground.base_sigma,
+            "height_m": tracked.ground.height_m,
+            "height_sigma_m": tracked.ground.common_sigma_m,
+            "scatter_m": tracked.ground.sigma_m,
+            "slope_sigma": tracked.ground.slope_sigma,
             "shown_by": tracked.ground.feet,
         },
         "moving": [describe_track(track, timestamps) for track in tracked.tracks],

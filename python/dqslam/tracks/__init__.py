@@ -1,4 +1,4 @@
-"""Things that move: tracks of position, heading and speed from boxes that no place at rest explains."""
+"""Things that move: tracks of position, heading and speed, from boxes that the map leaves over."""
 
 from dqslam.tracks.estimate import PathCovariance as PathCovariance
 from dqslam.tracks.estimate import Tracked as Tracked

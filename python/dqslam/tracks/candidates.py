@@ -15,7 +15,7 @@ from dqslam.assumptions.traffic import usual_sides
 from dqslam.recording import Recording
 from dqslam.tracks.body import Views
 from dqslam.tracks.fit import fit_track
-from dqslam.tracks.ground import Ground, feet_of_boxes, feet_of_ellipsoids, find_ground
+from dqslam.tracks.ground import Feet, Ground, feet_of_boxes, feet_of_ellipsoids, find_ground
 from dqslam.tracks.motion import ABOVE, HEADING, X, Y, motion_noise
 from dqslam.tracks.motion import SIZE as STATE_SIZE
 from dqslam.tracks.problem import TrackProblem, Trajectory
@@ -52,9 +52,7 @@ class Scene:
         )
         axes = Rotation.from_quat(self.cameras[poses, 3:]).as_matrix()
         views = Views(camera, turn.T @ axes, self.cameras[poses, :3] @ turn)
-        height = np.full(len(rows), 2.0 * np.exp(size.log_half[2]))
-        every = np.ones(len(rows), dtype=np.bool_)
-        feet = feet_of_boxes(camera, self.cameras[poses], box, every, height) @ turn
+        depth = camera.fy * 2.0 * np.exp(size.log_half[2]) / (box[:, 3] - box[:, 1])
         variance = np.diagonal(self.box_noise.covariance(box, camera), axis1=1, axis2=2)
         return TrackProblem(
             views,
@@ -62,8 +60,8 @@ class Scene:
             box,
             variance,
             detections.truncated[rows],
-            self.ground,
-            self.ground.sigma(feet[:, :2]),
+            self.ground.planes(views.rotation, views.position),
+            self.ground.sigmas(depth),
             size,
             motion_noise(class_name),
         )
@@ -93,19 +91,30 @@ def make_scene(
     that boxes show, -1 for none.
     """
     cameras = _core.world_from_camera(recording.odometry.pose_model, recording.camera, poses)
-    unknown = find_ground(cameras, np.zeros((0, 3)))
+    unknown = find_ground(cameras, NO_FEET)
     scene = Scene(recording, cameras, unknown, box_noise, size_prior)
-    feet = np.array(
-        [
-            _foot(scene, ellipsoids[row], np.flatnonzero(object_rows == row))
-            for row in np.unique(object_rows[object_rows >= 0]).tolist()
-        ]
-    ).reshape(-1, 3)
-    if len(feet) < FEWEST_RESTING:
-        feet = np.concatenate([feet, _feet_of_known_classes(recording, cameras)])
-    return replace(scene, ground=find_ground(cameras, feet))
+    pose = recording.detections.pose
+    shown = [
+        np.flatnonzero(object_rows == row)
+        for row in np.unique(object_rows[object_rows >= 0]).tolist()
+    ]
+    feet = [_foot(scene, ellipsoids[object_rows[rows[0]]], rows) for rows in shown]
+    found = Feet(
+        np.repeat(np.arange(len(shown)), [len(rows) for rows in shown]),
+        np.concatenate([*(pose[rows] for rows in shown), np.zeros(0, dtype=np.int64)]),
+        np.concatenate(
+            [
+                *(np.tile(foot, (len(rows), 1)) for foot, rows in zip(feet, shown, strict=True)),
+                np.zeros((0, 3)),
+            ]
+        ),
+    )
+    if len(shown) < FEWEST_RESTING:
+        found = _feet_of_known_classes(recording, cameras, len(shown), found)
+    return replace(scene, ground=find_ground(cameras, found))
 
 
+NO_FEET = Feet(np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros((0, 3)))
 # So many things at rest tell the ground without the help of classes.
 FEWEST_RESTING = 5
 # So many boxes of a thing at rest are enough to tell where it stands, and so many iterations.
@@ -129,7 +138,7 @@ def _foot(scene: Scene, ellipsoid: Floats, rows: Ints) -> Floats:
     problem = scene.problem(rows, size, scene.class_name(rows))
     state = np.zeros((len(rows), STATE_SIZE))
     state[:, X : Y + 1] = lowest @ turn[:, :2]
-    state[:, ABOVE] = lowest @ turn[:, 2] - scene.ground.height(state[:1, X : Y + 1])[0]
+    state[:, ABOVE] = (lowest @ turn[:, 2] - problem.plane[:, 0]) / problem.above
     orientation = _core.axes_from_ellipsoid(ellipsoid)[2]
     axis = Rotation.from_quat(orientation).as_matrix()[:, 0] @ turn
     state[:, HEADING] = np.arctan2(axis[1], axis[0])
@@ -138,9 +147,7 @@ def _foot(scene: Scene, ellipsoid: Floats, rows: Ints) -> Floats:
     fit = fit_track(problem, start, still, max_iterations=_ITERATIONS_OF_FOOT)
     if fit is None:
         return lowest
-    x, y, above = fit.trajectory.state[len(rows) // 2, : ABOVE + 1]
-    height = scene.ground.height(np.array([[x, y]]))[0][0] + above
-    return np.asarray(turn @ [x, y, height])
+    return np.asarray(turn @ np.median(problem.feet(fit.trajectory.state), axis=0))
 
 
 def one_an_image(recording: Recording, rows: Ints) -> Ints:
@@ -150,18 +157,26 @@ def one_an_image(recording: Recording, rows: Ints) -> Ints:
     return rows[np.diff(detections.pose[rows], prepend=-1) > 0]
 
 
-def _feet_of_known_classes(recording: Recording, cameras: Floats) -> Floats:
-    """Return where things of known height stand by their boxes, one for each class and image."""
+def _feet_of_known_classes(recording: Recording, cameras: Floats, known: int, feet: Feet) -> Feet:
+    """Add where things of known height stand by their boxes to the feet of ``known`` things.
+
+    Each box is a thing by itself.
+    """
     detections = recording.detections
     sides = {number: usual_sides(name) for number, name in detections.class_names.items()}
     heights = np.array(
         [np.nan if (own := sides[one]) is None else own[2] for one in detections.class_id.tolist()]
     )
     usable = np.isfinite(heights) & ~detections.truncated[:, [1, 3]].any(axis=1)
+    images = detections.pose[usable]
     seen_from = cameras[detections.pose]
-    feet = feet_of_boxes(recording.camera, seen_from, detections.box, usable, heights)
-    near = np.linalg.norm(feet - seen_from[usable, :3], axis=1) < _NEAR_M
-    return feet[near]
+    place = feet_of_boxes(recording.camera, seen_from, detections.box, usable, heights)
+    near = np.linalg.norm(place - cameras[images, :3], axis=1) < _NEAR_M
+    return Feet(
+        np.append(feet.thing, known + np.arange(near.sum())),
+        np.append(feet.image, images[near]),
+        np.concatenate([feet.place, place[near]]),
+    )
 
 
 def group_boxes(recording: Recording, free: Bools, *, final: bool) -> list[Ints]:

@@ -12,10 +12,11 @@ from dqslam.assumptions import BoxNoise, SizePrior, SizePriors
 from dqslam.recording import Recording
 from dqslam.track import Track
 from dqslam.tracks.candidates import FEWEST_IMAGES, Scene, group_boxes, make_scene, thinned
-from dqslam.tracks.fit import covariance, fit_track
-from dqslam.tracks.ground import Ground, with_unknown_height
+from dqslam.tracks.fit import TrackFit, covariance, fit_track
+from dqslam.tracks.ground import Ground
 from dqslam.tracks.judge import Judgment, judge
 from dqslam.tracks.motion import ABOVE, HEADING, SIZE, SPEED, TURN, X, Y
+from dqslam.tracks.problem import TrackProblem, Trajectory
 
 PathCovariance = Callable[[Ints], Floats | None]
 """Joint covariance (6 n, 6 n) of small motions [m, rad] of the cameras at poses (n,), each in its
@@ -84,39 +85,10 @@ def estimate_tracks(
             unknown.append((rows, "whether it moves or rests is open"))
     scene = _with_ground_of_movers(scene, moving)
     tracks = tuple(
-        _track(scene, rows, _refined(scene, rows, judged), number, path_covariance)
+        _track(scene, rows, judged, number, path_covariance)
         for number, (rows, judged) in enumerate(moving)
     )
     return Tracked(tracks, tuple(still), tuple(unknown), scene.ground, track_of_box)
-
-
-def _with_ground_of_movers(scene: Scene, moving: list[tuple[Ints, Judgment]]) -> Scene:
-    """Return a scene whose ground is corrected by where the things that move stand.
-
-    Where each stands without the ground follows from its size. All of them together know the ground
-    under them better than things at rest beside it.
-    """
-    loose = replace(scene, ground=with_unknown_height(scene.ground))
-    above, variance = [], []
-    for rows, judged in moving:
-        fit = _refined(loose, rows, judged).fit
-        row = len(rows) // 2
-        above.append(float(fit.trajectory.state[row, ABOVE]))
-        variance.append(float(covariance(fit)[0][SIZE * row + ABOVE, SIZE * row + ABOVE]))
-    if scene.ground.kind == "unknown" or not moving:
-        return scene
-    return replace(scene, ground=scene.ground.corrected(np.array(above), np.array(variance)))
-
-
-def _refined(scene: Scene, rows: Ints, judged: Judgment) -> Judgment:
-    """Return the estimate of some boxes (n,) again, in a scene that is a little different."""
-    class_name = scene.class_name(rows)
-    size = scene.size(class_name)
-    if size is None:
-        return judged
-    problem = scene.problem(rows, size, class_name)
-    fit = fit_track(problem, judged.fit.trajectory, judged.moves)
-    return judged if fit is None else replace(judged, fit=fit)
 
 
 def _judge(scene: Scene, rows: Ints) -> Judgment | str:
@@ -127,10 +99,50 @@ def _judge(scene: Scene, rows: Ints) -> Judgment | str:
     size = scene.size(class_name)
     if size is None:
         return f"nothing tells how large a {class_name} is, hence nothing how far away it is"
-    rows = thinned(rows)
-    problem = scene.problem(rows, size, class_name)
-    judged = judge(problem, scene.cameras[scene.recording.detections.pose[rows]])
+    judged = judge(scene.problem(thinned(rows), size, class_name))
     return "no motion explains its boxes" if judged is None else judged
+
+
+def _with_ground_of_movers(scene: Scene, moving: list[tuple[Ints, Judgment]]) -> Scene:
+    """Return a scene whose ground is corrected by where the things that move stand.
+
+    Where each stands without the ground follows from its size. All of them together know the ground
+    under them better than things at rest beside it.
+    """
+    if scene.ground.kind == "unknown" or not moving:
+        return scene
+    loose = replace(scene, ground=scene.ground.of_unknown_height())
+    stands = []
+    for rows, judged in moving:
+        problem, fit = _refit(loose, rows, judged)
+        state, views = fit.trajectory.state, problem.views
+        distance = np.linalg.norm(state[:, X : Y + 1] - views.position[:, :2], axis=1)
+        row = int(np.argmin(distance))
+        place = SIZE * row + ABOVE
+        sigma = problem.above[row]
+        variance = sigma**2 * covariance(fit)[0][place, place]
+        stands.append((sigma * state[row, ABOVE], variance, distance[row]))
+    return replace(scene, ground=scene.ground.corrected(*np.array(stands).T))
+
+
+def _refit(scene: Scene, rows: Ints, judged: Judgment) -> tuple[TrackProblem, TrackFit]:
+    """Return the problem of some boxes (n,) in a scene that is a little different, and its fit.
+
+    Where no step leads on, the estimate stays where it is.
+    """
+    class_name = scene.class_name(rows)
+    size = scene.size(class_name)
+    assert size is not None  # what has none was not judged
+    problem = scene.problem(rows, size, class_name)
+    fit = fit_track(problem, _in_sigmas_of(problem, judged), judged.moves)
+    return problem, judged.fit if fit is None else fit
+
+
+def _in_sigmas_of(problem: TrackProblem, judged: Judgment) -> Trajectory:
+    """Return the estimate of a judgment with heights in the sigmas of another problem."""
+    state = judged.fit.trajectory.state.copy()
+    state[:, ABOVE] *= judged.above / problem.above
+    return Trajectory(state, judged.fit.trajectory.log_half)
 
 
 def _track(
@@ -139,7 +151,7 @@ def _track(
     """Return the track of some boxes (n,) in the world, with its uncertainty."""
     from scipy.spatial.transform import Rotation
 
-    fit, count = judged.fit, len(rows)
+    (problem, fit), count = _refit(scene, rows, judged), len(rows)
     state, log_half = fit.trajectory.state.copy(), fit.trajectory.log_half
     poses, ground = scene.recording.detections.pose[rows], scene.ground
     spread, by_camera = covariance(fit)
@@ -149,13 +161,13 @@ def _track(
     if np.median(state[:, SPEED]) < 0.0:  # it looks the same from behind: forward is where it goes
         state[:, HEADING] += np.pi
         state[:, SPEED] *= -1.0
-    height, slope = ground.height(state[:, X : Y + 1])
     half = np.exp(log_half)
-    center = np.column_stack([state[:, :2], height + state[:, 2] + half[2]])
+    center = problem.feet(state) + [0.0, 0.0, half[2]]
     # The center by x, y and height of the foot, and by the logarithm of half the height.
     jacobian = np.zeros((count, 3, SIZE + 3))
     jacobian[:, range(3), range(3)] = 1.0
-    jacobian[:, 2, :2], jacobian[:, 2, SIZE + 2] = slope, half[2]
+    jacobian[:, 2, :2], jacobian[:, 2, ABOVE] = problem.plane[:, 1:], problem.above
+    jacobian[:, 2, SIZE + 2] = half[2]
     own = np.arange(SIZE * count).reshape(count, SIZE)
     places = np.column_stack([own, np.tile(SIZE * count + np.arange(3), (count, 1))])
     blocks = spread[places[:, :, None], places[:, None, :]]

@@ -24,7 +24,7 @@ class TrackFit:
     equations: Equations
     """At the estimate."""
     log_evidence: float
-    """Logarithm of the marginal likelihood, by Laplace's method, up to what all hypotheses share."""
+    """Log of the marginal likelihood, by Laplace's method, up to what all hypotheses share."""
     converged: bool
 
 

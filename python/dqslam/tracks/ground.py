@@ -1,16 +1,15 @@
 """The ground that things move on, as far as the cameras and what they saw show it.
 
-A robot's camera stays at one height above the ground and is not tilted sideways to it, so the
-ground is the plane along the path and the camera's x axis, so far below: uphill and downhill, and
-where a drifting path is tilted. A camera in the hand does not: then the ground is level. Of the
-two, that one is taken on which things stand with less scatter.
+A robot's camera stays at one height above the ground, and turned to it in one way: the ground is a
+plane in its frame, uphill, downhill and where a drifting path is tilted. A camera in the hand does
+not: then the ground is level in the world. Of the two, that one is taken on which things stand with
+less scatter.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -22,154 +21,203 @@ from dqslam.metrics.upright import up_direction
 FEWEST_FEET = 3
 # Things that stand on the ground are off it by this at least [m]: curbs, and errors of boxes.
 LEAST_SIGMA_M = 0.05
-# Beside the path, the ground falls or rises by this share of the distance.
-SIDE_SLOPE = 0.02
+# Away from the camera, the ground falls or rises by this share of the distance at least, ...
+LEAST_SLOPE = 0.005
+# ... and a camera is turned to it as it is to the direction up on average, with this sigma [rad].
+# If it moves in one direction of its own, as a vehicle does, it moves along the ground.
+TURNED_SIGMA, TURNED_SIGMA_OF_VEHICLE = 0.05, 0.01
+# The mean of unit vectors of the motion over so far [m] is at least so long then, and so much of it
+# is across the camera's x axis.
+_SPAN_M, _ONE_DIRECTION, _ACROSS = 2.0, 0.95, 0.5
 # Without a ground, the foot is anywhere within this height [m].
 UNKNOWN_SIGMA_M = 100.0
-# Rounds in which the scatter about the ground is found.
 _ROUNDS = 10
-# A camera's x axis tells the slope across the path if so much of it is across.
-_LEAST_ACROSS = 0.5
-# Of a path, at most so many places hold the ground.
-_MOST_ANCHORS = 2000
 
 
 @dataclass(frozen=True, eq=False)
 class Ground:
-    """Heights of the ground in a frame whose third axis is up."""
+    """A plane below the camera or in the world, in a frame whose third axis is up."""
 
     world_from_ground: Floats
     """Rotation about the world's origin, shape (3, 3)."""
-    anchors: Floats
-    """Places whose heights are known, meters, shape (a, 2)."""
-    heights: Floats
-    """Of the ground at these places, meters, shape (a,)."""
-    slopes: Floats
-    """Of the ground there, shape (a, 2)."""
-    base_sigma: float
-    """Of the height at which a thing stands near the places, each thing by itself, meters."""
-    common_sigma: float
-    """Of the heights of the ground, in common, meters."""
-    kind: Literal["below the path", "level", "unknown"]
+    kind: Literal["below the camera", "level", "unknown"]
+    normal: Floats
+    """Unit normal in the frame of the camera, or of the ground where that is level, shape (3,)."""
+    height_m: float
+    """Of the camera above the ground, or of a level ground in its frame, meters."""
+    sigma_m: float
+    """Of the height at which a thing stands near the camera, each by itself, meters."""
+    slope_sigma: float
+    """What that grows by with the distance from the camera, as a share of it."""
+    common_sigma_m: float
+    """Of the height of the ground, the same everywhere, meters."""
     feet: int
     """How many lower ends of things have shown it."""
 
-    def height(self, places: Floats) -> tuple[Floats, Floats]:
-        """Return the height [m] at places (n, 2), shape (n,), and its slope there, (n, 2)."""
-        nearest = self._nearest.query(places)[1]
-        slope = self.slopes[nearest]
-        rise = np.sum(slope * (places - self.anchors[nearest]), axis=1)
-        return self.heights[nearest] + rise, slope
+    def planes(self, rotation: Floats, position: Floats) -> Floats:
+        """Return the ground c + a x + b y as cameras see it, rows of c, a, b; shape (n, 3).
 
-    def sigma(self, places: Floats) -> float:
-        """Return the sigma [m] of the height at which a thing stands at places (n, 2), in the middle.
-
-        Beside a path the ground may fall or rise as roads do for the rain.
+        ``rotation`` (n, 3, 3) and ``position`` (n, 3) are those of the cameras in the ground's
+        frame.
         """
-        aside = np.median(self._own_sigma(places))
-        return float(np.hypot(aside, self.common_sigma))
+        if self.kind != "below the camera":
+            return np.tile([self.height_m, 0.0, 0.0], (len(position), 1))
+        normal = rotation @ self.normal
+        slope = -normal[:, :2] / normal[:, 2:]
+        beneath = position[:, 2] - self.height_m / normal[:, 2]
+        return np.column_stack([beneath - np.sum(slope * position[:, :2], axis=1), slope])
 
-    def corrected(self, above: Floats, variance: Floats) -> Ground:
+    def sigmas(self, distance: Floats) -> Floats:
+        """Return the sigmas [m] of the height at which a thing stands at distances [m], (n,)."""
+        return np.sqrt(self._own(distance) ** 2 + self.common_sigma_m**2)
+
+    def corrected(self, above: Floats, variance: Floats, distance: Floats) -> Ground:
         """Return the ground as corrected by heights [m] at which things stand above it, (t,).
 
-        ``variance`` [m^2] (t,) is that of what these things say by themselves, without the ground.
+        ``variance`` [m^2] is that of what these things say by themselves, without the ground, and
+        ``distance`` [m] that from the camera, both of shape (t,).
         """
-        weight = 1.0 / (variance + self.base_sigma**2)
-        total = self.common_sigma**-2 + weight.sum()
+        weight = 1.0 / (variance + self._own(distance) ** 2)
+        total = self.common_sigma_m**-2 + weight.sum()
         rise = float(weight @ above / total)
-        return replace(self, heights=self.heights + rise, common_sigma=float(total**-0.5))
+        way = -1.0 if self.kind == "below the camera" else 1.0
+        return replace(self, height_m=self.height_m + way * rise, common_sigma_m=float(total**-0.5))
 
-    def _own_sigma(self, places: Floats) -> Floats:
-        """Return the sigma [m] of the height of things at places (n, 2), beside what is common."""
-        if self.kind != "below the path":
-            return np.full(len(places), self.base_sigma)
-        return np.hypot(self.base_sigma, SIDE_SLOPE * self._nearest.query(places)[0])
+    def of_unknown_height(self) -> Ground:
+        """Return a ground of the same shape whose height is unknown."""
+        return replace(self, common_sigma_m=UNKNOWN_SIGMA_M)
 
-    @cached_property
-    def _nearest(self) -> Any:
-        from scipy.spatial import cKDTree
-
-        return cKDTree(self.anchors)
+    def _own(self, distance: Floats) -> Floats:
+        return np.asarray(np.hypot(self.sigma_m, self.slope_sigma * distance))
 
 
-def find_ground(cameras: Floats, feet: Floats) -> Ground:
-    """Find the ground from camera poses and lower ends of things.
+@dataclass(frozen=True, eq=False)
+class Feet:
+    """Where things stand, as images show them: one row for a thing in an image."""
 
-    Parameters
-    ----------
-    cameras
-        world_from_camera, held without roll, shape (n, 7).
-    feet
-        Lower ends in the world, meters, shape (f, 3), one for each thing.
-    """
+    thing: Ints
+    """Number of the thing, shape (f,)."""
+    image: Ints
+    """Row of the pose, shape (f,)."""
+    place: Floats
+    """In the world, meters, shape (f, 3)."""
+
+
+def find_ground(cameras: Floats, feet: Feet) -> Ground:
+    """Find the ground from camera poses world_from_camera (n, 7) and where things stand."""
     from scipy.spatial.transform import Rotation
 
     up = up_direction(cameras)
     axis = np.eye(3)[int(np.argmin(np.abs(up)))]
-    east = np.cross(axis, up)
-    east /= np.linalg.norm(east)
+    east = np.cross(axis, up) / np.linalg.norm(np.cross(axis, up))
     turn = np.column_stack([east, np.cross(up, east), up])
-    cameras = cameras[:: -(-len(cameras) // _MOST_ANCHORS)]
-    right = Rotation.from_quat(cameras[:, 3:]).as_matrix()[:, :, 0] @ turn
-    path, feet = cameras[:, :3] @ turn, feet @ turn
-    level = (path[:1, :2], np.zeros(1), np.zeros((1, 2)))
-    below = (path[:, :2], path[:, 2], _slopes(path, right))
-    if len(feet) < FEWEST_FEET:
-        level = (path[:1, :2], path[:, 2].mean(keepdims=True), np.zeros((1, 2)))
-        return Ground(turn, *level, LEAST_SIGMA_M, UNKNOWN_SIGMA_M, "unknown", len(feet))
-    choices = [
-        _fit(Ground(turn, *shape, LEAST_SIGMA_M, 0.0, kind, len(feet)), feet)
-        for kind, shape in (("below the path", below), ("level", level))
-    ]
-    return min(choices, key=lambda one: np.median(one._own_sigma(feet[:, :2])))
+    count = len(np.unique(feet.thing))
+    if count < FEWEST_FEET:
+        height = float((cameras[:, :3] @ up).mean())
+        sigmas = (LEAST_SIGMA_M, LEAST_SLOPE, UNKNOWN_SIGMA_M)
+        return Ground(turn, "unknown", np.eye(3)[2], height, *sigmas, count)
+    axes = Rotation.from_quat(cameras[:, 3:]).as_matrix()
+    toward = np.einsum("nji,nj->ni", axes[feet.image], feet.place - cameras[feet.image, :3])
+    distance = np.linalg.norm(toward, axis=1)
+    share = 1.0 / np.bincount(feet.thing)[feet.thing]
+    normal, turned_sigma = _normal_in_camera(cameras, axes, up)
+    normal, off_camera = _turned(normal, turned_sigma, toward, distance, share)
+    off_world = feet.place @ up
+    choices: list[tuple[float, Ground]] = []
+    for kind, way, own, off in (
+        ("below the camera", -1.0, normal, off_camera),
+        ("level", 1.0, np.eye(3)[2], off_world),
+    ):
+        middle = _weighted_median(off, share)
+        away = np.abs(off - middle)
+        scatter = _weighted_median(away, share)
+        sigma, slope = _spread(away, distance, share)
+        weight = share / (sigma**2 + (slope * distance) ** 2)
+        if kind == "below the camera":  # how it is turned is as unknown as how high it is
+            columns, prior = _columns(normal, turned_sigma, toward)
+            variance = np.linalg.inv(columns.T @ (weight[:, None] * columns) + prior)[2, 2]
+        else:
+            variance = 1.0 / weight.sum()
+        # A median is less certain than a mean by pi / 2; of few feet, the spread is itself unsure.
+        common = float(np.sqrt(0.5 * np.pi * variance * (1.0 + 3.0 / count)))
+        ground = Ground(turn, kind, own, way * middle, sigma, slope, common, count)
+        choices.append((scatter, ground))
+    return min(choices, key=lambda one: one[0])[1]
 
 
-def _fit(ground: Ground, feet: Floats) -> Ground:
-    """Return a ground at the height, and with the scatter, of things that stand at feet (f, 3).
+def _normal_in_camera(cameras: Floats, axes: Floats, up: Floats) -> tuple[Floats, float]:
+    """Return the normal of the ground in the camera's frame, (3,), and how sure it is [rad].
 
-    The height is the weighted median: some things hang, or move. Half of the others are off by less
-    than 0.6745 of their sigma, which grows with the distance from the path.
+    A vehicle moves along the ground, and the x axis of its camera is level to it. Of other cameras
+    the direction up is known, on average.
     """
-    off = feet[:, 2] - ground.height(feet[:, :2])[0]
-    base = LEAST_SIGMA_M
+    step = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(cameras[:, :3], axis=0), axis=1)))
+    ends = np.searchsorted(step, step + _SPAN_M)
+    starts = np.flatnonzero(ends < len(step))
+    run = cameras[ends[starts], :3] - cameras[starts, :3]
+    ahead = np.einsum("nji,nj->ni", axes[starts], run)
+    ahead = (ahead / np.linalg.norm(ahead, axis=1, keepdims=True)).sum(axis=0) / max(len(run), 1)
+    normal = np.cross(ahead, [1.0, 0.0, 0.0])
+    mean_up = (up @ axes).mean(axis=0)
+    if np.linalg.norm(ahead) > _ONE_DIRECTION and np.linalg.norm(normal) > _ACROSS:
+        normal *= np.sign(normal @ mean_up)
+        return normal / np.linalg.norm(normal), TURNED_SIGMA_OF_VEHICLE
+    return mean_up / np.linalg.norm(mean_up), TURNED_SIGMA
+
+
+def _columns(normal: Floats, turned_sigma: float, toward: Floats) -> tuple[Floats, Floats]:
+    """Return how turns of a normal, about two axes, and a shift move feet (f, 3), and their prior.
+
+    Shapes (f, 3) and (3, 3).
+    """
+    basis = np.linalg.svd(normal[None])[2][1:]
+    columns = np.column_stack([toward @ basis.T, np.ones(len(toward))])
+    return columns, np.diag([turned_sigma**-2, turned_sigma**-2, 0.0])
+
+
+def _turned(
+    normal: Floats, turned_sigma: float, toward: Floats, distance: Floats, share: Floats
+) -> tuple[Floats, Floats]:
+    """Turn a normal in the camera's frame to where feet (f, 3) there are on one plane.
+
+    Returns the normal and the coordinates of the feet along it [m], (f,). Feet count by their share
+    and their distance, and less the further they are off.
+    """
+    basis = np.linalg.svd(normal[None])[2][1:]
+    columns, prior = _columns(normal, turned_sigma, toward)
+    sigma = np.hypot(LEAST_SIGMA_M, 2.0 * LEAST_SLOPE * distance)
+    weight, found = share / sigma**2, np.zeros(3)
     for _ in range(_ROUNDS):
-        sigma = replace(ground, base_sigma=base)._own_sigma(feet[:, :2])
-        order = np.argsort(off)
-        share = np.cumsum(sigma[order] ** -2.0)
-        middle = float(off[order][np.searchsorted(share, 0.5 * share[-1])])
-        factor = float(np.median(np.abs(off - middle) / sigma)) / 0.6745
-        if factor <= 1.0:
-            break
-        base *= factor
-    # The median is less certain than a mean by pi / 2; of few feet, the scatter is itself unsure.
-    common = np.sqrt(0.5 * np.pi / np.sum(sigma**-2.0) * (1.0 + 3.0 / len(feet)))
-    heights = ground.heights + middle
-    return replace(ground, heights=heights, base_sigma=base, common_sigma=float(common))
+        right = -columns.T @ (weight * (toward @ normal))
+        found = np.linalg.solve(columns.T @ (weight[:, None] * columns) + prior, right)
+        off = (toward @ normal + columns @ found) / sigma
+        weight = share / sigma**2 / (1.0 + (off / 3.0) ** 2)
+    turned = normal + found[:2] @ basis
+    turned /= np.linalg.norm(turned)
+    return turned, toward @ turned
 
 
-def _slopes(path: Floats, right: Floats) -> Floats:
-    """Return the slope of the ground along a path (n, 3) and x axes of its cameras (n, 3), (n, 2).
+def _spread(away: Floats, distance: Floats, share: Floats) -> tuple[float, float]:
+    """Return the sigma [m] near the camera and its growth, by how far feet are off [m], (f,).
 
-    Along the path over the length of a car at least, so that jitter is no slope. Where it does not
-    go so far, and across an axis along the path, the ground is level.
+    Half of the feet of a normal are off by less than 0.6745 sigma. The growth is that of the
+    farther half of them.
     """
-    reach = 4.0
-    length = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(path[:, :2], axis=0), axis=1)))
-    first = np.searchsorted(length, length - reach).clip(max=len(path) - 1)
-    last = np.searchsorted(length, length + reach).clip(max=len(path) - 1)
-    run = path[last] - path[first]
-    run[np.linalg.norm(run, axis=1) < 0.5 * reach] = [1e-9, 0.0, 0.0]
-    # The least slope g with g . d = rise of the run, and of the axis less its part along the run.
-    along = run / np.linalg.norm(run[:, :2], axis=1, keepdims=True)
-    across = right - np.sum(right[:, :2] * along[:, :2], axis=1, keepdims=True) * along
-    width = np.linalg.norm(across[:, :2], axis=1, keepdims=True)
-    across = np.where(width > _LEAST_ACROSS, across / np.maximum(width, _LEAST_ACROSS), 0.0)
-    return np.asarray(along[:, :2] * along[:, 2:] + across[:, :2] * across[:, 2:])
+    far = distance > _weighted_median(distance, share)
+    slope = LEAST_SLOPE
+    if far.any():
+        slope = max(slope, _weighted_median(away[far] / distance[far], share[far]) / 0.6745)
+    sigma = LEAST_SIGMA_M
+    for _ in range(_ROUNDS):
+        own = np.hypot(sigma, slope * distance)
+        sigma *= max(_weighted_median(away / own, share) / 0.6745, LEAST_SIGMA_M / sigma)
+    return float(sigma), float(slope)
 
 
-def with_unknown_height(ground: Ground) -> Ground:
-    """Return a ground of the same shape whose height is unknown."""
-    return replace(ground, common_sigma=UNKNOWN_SIGMA_M)
+def _weighted_median(values: Floats, weight: Floats) -> float:
+    order = np.argsort(values)
+    share = np.cumsum(weight[order])
+    return float(values[order][np.searchsorted(share, 0.5 * share[-1])])
 
 
 def feet_of_ellipsoids(ellipsoids: Floats, up: Floats) -> Floats:

@@ -18,7 +18,6 @@ from dqslam.tracks.motion import SPEED, X, Y
 from dqslam.tracks.problem import TrackProblem, Trajectory
 from dqslam.tracks.start import moving_start, resting_starts, rough_places, stopping_start
 
-
 # What of things that are seen is at rest, moves, and does both, before their boxes say more.
 PRIOR: dict[Behavior, float] = {"rests": 0.6, "moves": 0.3, "stops and goes": 0.1}
 # A thing moves if it rests with at most this probability.
@@ -43,6 +42,8 @@ class Judgment:
     """Of the most likely one."""
     moves: Bools
     """Whether it moves between images, shape (n - 1,)."""
+    above: Floats
+    """What heights above the ground are in units of, meters, shape (n,)."""
 
     @property
     def is_mover(self) -> bool:
@@ -54,13 +55,10 @@ class Judgment:
         return bool(reach > np.exp(self.fit.trajectory.log_half[0]))
 
 
-def judge(problem: TrackProblem, cameras: Floats) -> Judgment | None:
-    """Compare what a thing may do; None where no hypothesis has an estimate.
-
-    ``cameras`` (n, 7) are world_from_camera of its images.
-    """
-    count = len(cameras)
-    places, weight = rough_places(problem, cameras)
+def judge(problem: TrackProblem) -> Judgment | None:
+    """Compare what a thing may do; None where no hypothesis has an estimate."""
+    count = len(problem.seconds)
+    places, weight = rough_places(problem)
     all_along, never = np.ones(count - 1, dtype=np.bool_), np.zeros(count - 1, dtype=np.bool_)
     fits: dict[Behavior, tuple[TrackFit, Bools, float]] = {}
     moving = _fit(problem, moving_start(problem, places, weight), all_along)
@@ -84,7 +82,7 @@ def judge(problem: TrackProblem, cameras: Floats) -> Judgment | None:
     probability |= {name: float(np.exp(one - most) / total) for name, one in log_odds.items()}
     behavior = max(log_odds, key=lambda name: log_odds[name])
     fit, moves, _ = fits[behavior]
-    return Judgment(behavior, probability, fit, moves)
+    return Judgment(behavior, probability, fit, moves, problem.above)
 
 
 def _stops(problem: TrackProblem, moving: TrackFit) -> tuple[TrackFit, Bools, float] | None:

@@ -67,13 +67,12 @@ def find_moving(
 
 def _judge(scene: Scene, rows: Ints) -> Judgment | None:
     """Judge what some boxes (b,) show; None where that cannot be done."""
-    poses = scene.recording.detections.pose
     rows = thinned(one_an_image(scene.recording, rows))
     class_name = scene.class_name(rows)
     size = scene.size(class_name)
     if size is None or len(rows) < FEWEST_IMAGES:
         return None
-    return judge(scene.problem(rows, size, class_name), scene.cameras[poses[rows]])
+    return judge(scene.problem(rows, size, class_name))
 
 
 def _reason(class_name: str, judged: Judgment) -> str:

@@ -1,6 +1,6 @@
 """How things move on the ground: along their heading, with a speed and a turn rate that wander.
 
-A state is x, y [m], the height of the foot above the ground [m], the heading [rad], the speed
+A state is x, y [m], the height of the foot above the ground in sigmas, the heading [rad], the speed
 [m/s] along it, and the turn rate [rad/s]. Speed and turn rate change by white noise of a density.
 What rests has neither speed nor turn rate.
 """
@@ -16,7 +16,7 @@ from dqslam._checks import Bools, Floats
 X, Y, ABOVE, HEADING, SPEED, TURN = range(6)
 SIZE = 6
 """Numbers in a state."""
-# What rests moves this share of what moves: little enough to be none, for the equations to be sound.
+# What rests moves by this share of the noise of what moves: next to nothing, and not singular.
 STILL = 1e-2
 # Sigmas of speed [m/s] and turn rate [rad/s] at rest.
 STILL_SPEED, STILL_TURN = 0.02, 0.01
@@ -79,7 +79,7 @@ def compare_steps(
     moves
         Whether the thing moves between two states, shape (n - 1,); else it rests at the later one.
     drift
-        Density of the height above the ground, m / sqrt(s).
+        Density of the height above the ground, sigmas / sqrt(s).
     """
     before, after = state[:-1], state[1:]
     count, dt = len(seconds), seconds
@@ -136,11 +136,11 @@ def _whitening(dt: Floats, moves: Bools, stops: Bools, noise: MotionNoise, drift
     return white
 
 
-def first_sigmas(moves: bool, noise: MotionNoise, above: float) -> Floats:
-    """Return the sigmas (6,) of the first state: anywhere, with the speed of what moves or rests."""
+def first_sigmas(moves: bool, noise: MotionNoise) -> Floats:
+    """Return the sigmas (6,) of the first state: anywhere, as fast as what moves, or rests, is."""
     speed = noise.usual_speed if moves else STILL_SPEED
     turn = noise.usual_turn if moves else STILL_TURN
-    return np.array([ANYWHERE_M, ANYWHERE_M, above, np.pi, speed, turn])
+    return np.array([ANYWHERE_M, ANYWHERE_M, 1.0, np.pi, speed, turn])
 
 
 # Sigma of the first place along each axis.

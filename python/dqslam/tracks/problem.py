@@ -8,7 +8,6 @@ import numpy as np
 
 from dqslam._checks import Bools, Floats
 from dqslam.tracks.body import PredictedBoxes, Views, predict_boxes
-from dqslam.tracks.ground import Ground
 from dqslam.tracks.motion import (
     ABOVE,
     HEADING,
@@ -43,9 +42,10 @@ class TrackProblem:
     """Of each edge, pixels squared, shape (n, 4)."""
     truncated: Bools
     """Edges beyond which the thing may go on, shape (n, 4)."""
-    ground: Ground
-    above: float
-    """Sigma of the height of the foot above the ground, meters."""
+    plane: Floats
+    """The ground c + a x + b y of each image, rows of c, a, b; shape (n, 3)."""
+    above: Floats
+    """Sigma of the height of the foot above it, meters, shape (n,)."""
     size: BodySize
     noise: MotionNoise
 
@@ -58,7 +58,15 @@ class TrackProblem:
             box=self.box[rows],
             variance=self.variance[rows],
             truncated=self.truncated[rows],
+            plane=self.plane[rows],
+            above=self.above[rows],
         )
+
+    def feet(self, state: Floats) -> Floats:
+        """Return the feet [m] of states (n, 6), shape (n, 3)."""
+        place = state[:, X : Y + 1]
+        height = self.plane[:, 0] + np.sum(self.plane[:, 1:] * place, axis=1)
+        return np.column_stack([place, height + self.above * state[:, ABOVE]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +74,7 @@ class Trajectory:
     """States of a thing at its images, and its size."""
 
     state: Floats
-    """x, y, height above the ground, heading, speed, turn rate; shape (n, 6)."""
+    """x, y, height above the ground in sigmas, heading, speed, turn rate; shape (n, 6)."""
     log_half: Floats
     """Logarithms of half the length, width and height [m], shape (3,)."""
 
@@ -109,9 +117,7 @@ def linearize(
     """
     state, count = at.state, len(at.state)
     half = np.exp(at.log_half)
-    height, slope = problem.ground.height(state[:, X : Y + 1])
-    foot = np.column_stack([state[:, X], state[:, Y], height + state[:, ABOVE]])
-    seen = predict_boxes(problem.views, foot, state[:, HEADING], half)
+    seen = predict_boxes(problem.views, problem.feet(state), state[:, HEADING], half)
     if not (seen.is_whole | (seen.in_front & problem.truncated.any(axis=1))).all():
         return None
     sigma = np.sqrt(problem.variance)
@@ -122,15 +128,17 @@ def linearize(
     scale = np.where(error == 0.0, 0.0, np.sqrt(weight)[:, None] / sigma)[:, :, None]
     error = error * np.sqrt(weight)[:, None]
     by_state = np.zeros((count, 4, SIZE))
-    by_state[..., :ABOVE] = seen.by_place[..., :2] + seen.by_place[..., 2:3] * slope[:, None]
-    by_state[..., ABOVE : HEADING + 1] = seen.by_place[..., 2:]
+    slope = problem.plane[:, None, 1:]
+    by_state[..., :ABOVE] = seen.by_place[..., :2] + seen.by_place[..., 2:3] * slope
+    by_state[..., ABOVE] = seen.by_place[..., 2] * problem.above[:, None]
+    by_state[..., HEADING] = seen.by_place[..., 3]
     by_state, by_size, by_camera = scale * by_state, scale * seen.by_size, scale * seen.by_camera
     transposed = by_state.transpose(0, 2, 1)
     diagonal = transposed @ by_state
     gradient = np.einsum("nij,nj->ni", transposed, error)
     cost = 0.5 * (FREEDOM + 4.0) * float(np.log1p(chi2 / FREEDOM).sum())
 
-    drift = min(problem.above / np.sqrt(FORGOTTEN_AFTER_S), MOST_DRIFT)
+    drift = min(FORGOTTEN_AFTER_S**-0.5, MOST_DRIFT / float(np.median(problem.above)))
     steps = compare_steps(state, np.diff(problem.seconds), moves, problem.noise, drift)
     back, on = steps.by_from.transpose(0, 2, 1), steps.by_to.transpose(0, 2, 1)
     diagonal[:-1] += back @ steps.by_from
@@ -138,7 +146,7 @@ def linearize(
     gradient[:-1] += np.einsum("nij,nj->ni", back, steps.error)
     gradient[1:] += np.einsum("nij,nj->ni", on, steps.error)
 
-    sigmas = first_sigmas(bool(moves[0]), problem.noise, problem.above)
+    sigmas = first_sigmas(bool(moves[0]), problem.noise)
     middle = first.copy()
     middle[[ABOVE, SPEED, TURN]] = 0.0
     off = (state[0] - middle) / sigmas

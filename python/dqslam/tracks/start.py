@@ -1,44 +1,53 @@
-"""Where the estimate of a track starts: by the size of its class, and a straight line."""
+"""Where the estimate of a track starts: by the size of its class, and straight lines."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from dqslam._checks import Floats
-from dqslam.tracks.ground import feet_of_boxes
 from dqslam.tracks.motion import HEADING, SIZE, SPEED, TURN, X, Y
 from dqslam.tracks.problem import TrackProblem, Trajectory
 
+# A line is drawn through the places of about so many seconds on either side.
+SMOOTHED_OVER_S = 1.5
 # Headings of a thing at rest that are tried: those half a turn away look alike.
 RESTING_HEADINGS = np.radians([0.0, 60.0, 120.0])
 
 
-def rough_places(problem: TrackProblem, cameras: Floats) -> tuple[Floats, Floats]:
+def rough_places(problem: TrackProblem) -> tuple[Floats, Floats]:
     """Return where a thing stands by the height of each box, (n, 2), and their weights, (n,).
 
-    ``cameras`` (n, 7) are world_from_camera. Boxes whose upper or lower edge is cut have no weight,
-    unless all have; far places are worth less.
+    Boxes whose upper or lower edge is cut have no weight, unless all have; far places are worth
+    less.
     """
-    views, turn = problem.views, problem.ground.world_from_ground
-    height = np.full(len(cameras), 2.0 * np.exp(problem.size.log_half[2]))
-    usable = np.ones(len(cameras), dtype=np.bool_)
-    feet = feet_of_boxes(views.camera, cameras, problem.box, usable, height) @ turn
+    views, camera, box = problem.views, problem.views.camera, problem.box
+    depth = camera.fy * 2.0 * np.exp(problem.size.log_half[2]) / (box[:, 3] - box[:, 1])
+    middle = 0.5 * (box[:, 0] + box[:, 2])
+    ray = [(middle - camera.cx) / camera.fx, (box[:, 3] - camera.cy) / camera.fy]
+    seen = depth[:, None] * np.column_stack([*ray, np.ones(len(box))])
+    feet = views.position + np.einsum("nij,nj->ni", views.rotation, seen)
     whole = ~problem.truncated[:, [1, 3]].any(axis=1)
-    distance = np.linalg.norm(feet - views.position, axis=1)
-    weight = np.where(whole | (not whole.any()), 1.0, 1e-3) / distance**2
+    weight = np.where(whole | (not whole.any()), 1.0, 1e-3) / np.sum(seen**2, axis=1)
     return feet[:, :2], weight / weight.sum()
 
 
 def moving_start(problem: TrackProblem, places: Floats, weight: Floats) -> Trajectory:
-    """Start on the straight line through rough places (n, 2), at a constant speed."""
-    time = problem.seconds - weight @ problem.seconds
-    middle = weight @ places
-    spread = float(weight @ time**2)
-    velocity = (weight * time) @ places / spread if spread > 0.0 else np.zeros(2)
+    """Start on straight lines through rough places (n, 2), at the speeds along them.
+
+    The line at an image is that through the places of the seconds around it.
+    """
+    time = problem.seconds - problem.seconds[:, None]
+    near = weight * np.exp(-0.5 * (time / SMOOTHED_OVER_S) ** 2)
+    near /= near.sum(axis=1, keepdims=True)
+    middle_time = np.sum(near * time, axis=1)
+    middle = near @ places
+    spread = np.sum(near * time**2, axis=1) - middle_time**2
+    velocity = (near * (time - middle_time[:, None])) @ places
+    velocity /= np.maximum(spread, np.finfo(np.float64).tiny)[:, None]
     state = np.zeros((len(places), SIZE))
-    state[:, X : Y + 1] = middle + time[:, None] * velocity
-    state[:, HEADING] = np.arctan2(velocity[1], velocity[0])
-    state[:, SPEED] = np.linalg.norm(velocity)
+    state[:, X : Y + 1] = middle - middle_time[:, None] * velocity
+    state[:, HEADING] = np.unwrap(np.arctan2(velocity[:, 1], velocity[:, 0]))
+    state[:, SPEED] = np.linalg.norm(velocity, axis=1)
     return Trajectory(state, problem.size.log_half.copy())
 
 
