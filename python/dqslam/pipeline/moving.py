@@ -88,6 +88,7 @@ def _path_covariance(
             return None
         count = len(images)
         blocks = spread.reshape(count, -1, count, motion.shape[1])
-        return np.einsum("ab,ibjc,dc->iajd", motion, blocks, motion).reshape(6 * count, 6 * count)
+        moved = np.einsum("ab,ibjc,dc->iajd", motion, blocks, motion)
+        return np.asarray(moved).reshape(6 * count, 6 * count)
 
     return joint

@@ -24,7 +24,7 @@ from dqslam.tracks.sizes import BodySize, body_size
 # Two images tell a speed, but not whether it is one.
 FEWEST_IMAGES = 4
 # Of a track in more images, that many, evenly spaced, are used: a bound on time and memory.
-MOST_IMAGES = 300
+MOST_IMAGES = 150
 # Boxes tell the ground by the heights of their class if they are so near [m].
 _NEAR_M = 40.0
 
@@ -129,11 +129,11 @@ def _foot(scene: Scene, ellipsoid: Floats, rows: Ints) -> Floats:
     from scipy.spatial.transform import Rotation
 
     turn = scene.ground.world_from_ground
-    lowest = feet_of_ellipsoids(ellipsoid[None], turn[:, 2])[0]
+    (lowest,) = feet_of_ellipsoids(ellipsoid[None], turn[:, 2])
     rows = one_an_image(scene.recording, rows)
     size = scene.size(scene.class_name(rows)) if rows.size else None
     if size is None or len(rows) < 2:
-        return lowest
+        return np.asarray(lowest)
     rows = thinned(rows, most=_BOXES_OF_FOOT)
     problem = scene.problem(rows, size, scene.class_name(rows))
     state = np.zeros((len(rows), STATE_SIZE))
@@ -146,7 +146,7 @@ def _foot(scene: Scene, ellipsoid: Floats, rows: Ints) -> Floats:
     start = Trajectory(state, size.log_half)
     fit = fit_track(problem, start, still, max_iterations=_ITERATIONS_OF_FOOT)
     if fit is None:
-        return lowest
+        return np.asarray(lowest)
     return np.asarray(turn @ np.median(problem.feet(fit.trajectory.state), axis=0))
 
 

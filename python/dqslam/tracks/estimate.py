@@ -73,7 +73,7 @@ def estimate_tracks(
     track_of_box = np.full(len(recording.detections), -1)
     groups = group_boxes(recording, object_rows < 0, final=final)
     for rows in sorted(groups, key=lambda group: int(recording.detections.pose[group[0]])):
-        judged = _judge(scene, rows)
+        judged = _judge(scene, rows, path_covariance)
         if isinstance(judged, str):
             unknown.append((rows, judged))
         elif judged.is_mover:
@@ -91,7 +91,7 @@ def estimate_tracks(
     return Tracked(tracks, tuple(still), tuple(unknown), scene.ground, track_of_box)
 
 
-def _judge(scene: Scene, rows: Ints) -> Judgment | str:
+def _judge(scene: Scene, rows: Ints, path_covariance: PathCovariance) -> Judgment | str:
     """Judge what some boxes (b,) show; or say why that cannot be done."""
     if len(rows) < FEWEST_IMAGES:
         return f"seen in {len(rows)} images, {FEWEST_IMAGES} are needed"
@@ -99,7 +99,9 @@ def _judge(scene: Scene, rows: Ints) -> Judgment | str:
     size = scene.size(class_name)
     if size is None:
         return f"nothing tells how large a {class_name} is, hence nothing how far away it is"
-    judged = judge(scene.problem(thinned(rows), size, class_name))
+    rows = thinned(rows)
+    path = path_covariance(scene.recording.detections.pose[rows])
+    judged = judge(scene.problem(rows, size, class_name), path)
     return "no motion explains its boxes" if judged is None else judged
 
 

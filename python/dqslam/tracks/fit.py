@@ -33,7 +33,7 @@ class _Factor:
 
     def __init__(self, equations: Equations, damping: float = 0.0) -> None:
         """Factorize, the diagonal times 1 + ``damping``; LinAlgError where that is impossible."""
-        from scipy.linalg import cho_solve_banded, cholesky_banded
+        from scipy.linalg import cholesky_banded
 
         count = len(equations.diagonal)
         band = np.zeros((2 * SIZE, SIZE * count))
@@ -44,24 +44,28 @@ class _Factor:
         place = np.arange(count - 1)[:, None] * SIZE + columns
         band[SIZE + rows - columns, place] = equations.below[:, rows, columns]
         band[0] *= 1.0 + damping
-        self._chain = (cholesky_banded(band, lower=True, check_finite=False), True)
-        self._solve_chain = lambda right: cho_solve_banded(self._chain, right, check_finite=False)
+        self._chain: Floats = cholesky_banded(band, lower=True, check_finite=False)
         self._border = equations.border.reshape(-1, 3)
         self._reduced = self._solve_chain(self._border)
         corner = equations.corner + damping * np.diag(np.diag(equations.corner))
-        self._corner = corner - self._border.T @ self._reduced
+        self._corner: Floats = np.asarray(corner - self._border.T @ self._reduced)
         np.linalg.cholesky(self._corner)
 
     def solve(self, states: Floats, size: Floats) -> tuple[Floats, Floats]:
         """Solve for right sides of the states (6 n, r) and of the size (3, r)."""
         chain = self._solve_chain(states)
-        of_size = np.linalg.solve(self._corner, size - self._border.T @ chain)
+        of_size = np.asarray(np.linalg.solve(self._corner, size - self._border.T @ chain))
         return chain - self._reduced @ of_size, of_size
+
+    def _solve_chain(self, right: Floats) -> Floats:
+        from scipy.linalg import cho_solve_banded
+
+        return np.asarray(cho_solve_banded((self._chain, True), right, check_finite=False))
 
     @property
     def log_determinant(self) -> float:
         """Of the whole matrix."""
-        chain = 2.0 * float(np.log(self._chain[0][0]).sum())
+        chain = 2.0 * float(np.log(self._chain[0]).sum())
         return chain + float(np.linalg.slogdet(self._corner)[1])
 
 
@@ -112,6 +116,27 @@ def fit_track(
     return TrackFit(at, equations, evidence, converged)
 
 
+def evidence_of_path(fit: TrackFit, path: Floats) -> float:
+    """Return what the log evidence gains if the cameras are not exact, but have a joint covariance.
+
+    The covariance (6 n, 6 n) is of small motions of the cameras, each in its own frame [m, rad].
+    With g and M the gradient and the second derivative by these motions, the states eliminated, and
+    P the covariance, the motions that fit best lower the cost by g (1 + P M)^-1 P g / 2, and their
+    volume costs log |1 + P M| / 2.
+    """
+    equations = fit.equations
+    _, change = covariance(fit)
+    count = len(equations.diagonal)
+    information = _coupling(equations).T @ change
+    for row in range(count):
+        own = slice(6 * row, 6 * row + 6)
+        information[own, own] += equations.of_camera[row]
+    gradient = equations.gradient_camera.ravel()
+    both = np.eye(6 * count) + path @ information
+    gain = gradient @ np.linalg.solve(both, path @ gradient)
+    return 0.5 * float(gain) - 0.5 * float(np.linalg.slogdet(both)[1])
+
+
 def covariance(fit: TrackFit) -> tuple[Floats, Floats]:
     """Return the covariance (6 n + 3, 6 n + 3) of states and size, and the change by the cameras.
 
@@ -124,9 +149,15 @@ def covariance(fit: TrackFit) -> tuple[Floats, Floats]:
     full = SIZE * count + 3
     states, size = np.eye(full)[:-3], np.eye(full)[-3:]
     inverse = np.vstack(factor.solve(states, size))
-    coupling = np.zeros((full, 6 * count))
+    return inverse, -inverse @ _coupling(equations)
+
+
+def _coupling(equations: Equations) -> Floats:
+    """Return the second derivatives by states and size, and motions of cameras, (6 n + 3, 6 n)."""
+    count = len(equations.diagonal)
+    coupling = np.zeros((SIZE * count + 3, 6 * count))
     for row in range(count):
         columns = slice(6 * row, 6 * row + 6)
         coupling[SIZE * row : SIZE * row + SIZE, columns] = equations.by_camera[row, :SIZE]
         coupling[-3:, columns] = equations.by_camera[row, SIZE:]
-    return inverse, -inverse @ coupling
+    return coupling

@@ -33,6 +33,8 @@ _SPAN_M, _ONE_DIRECTION, _ACROSS = 2.0, 0.95, 0.5
 UNKNOWN_SIGMA_M = 100.0
 _ROUNDS = 10
 
+GroundKind = Literal["below the camera", "level", "unknown"]
+
 
 @dataclass(frozen=True, eq=False)
 class Ground:
@@ -40,7 +42,7 @@ class Ground:
 
     world_from_ground: Floats
     """Rotation about the world's origin, shape (3, 3)."""
-    kind: Literal["below the camera", "level", "unknown"]
+    kind: GroundKind
     normal: Floats
     """Unit normal in the frame of the camera, or of the ground where that is level, shape (3,)."""
     height_m: float
@@ -124,10 +126,11 @@ def find_ground(cameras: Floats, feet: Feet) -> Ground:
     normal, off_camera = _turned(normal, turned_sigma, toward, distance, share)
     off_world = feet.place @ up
     choices: list[tuple[float, Ground]] = []
-    for kind, way, own, off in (
+    kinds: tuple[tuple[GroundKind, float, Floats, Floats], ...] = (
         ("below the camera", -1.0, normal, off_camera),
         ("level", 1.0, np.eye(3)[2], off_world),
-    ):
+    )
+    for kind, way, own, off in kinds:
         middle = _weighted_median(off, share)
         away = np.abs(off - middle)
         scatter = _weighted_median(away, share)

@@ -13,7 +13,7 @@ import numpy as np
 
 from dqslam._checks import Bools, Floats
 from dqslam.track import Behavior
-from dqslam.tracks.fit import TrackFit, fit_track
+from dqslam.tracks.fit import TrackFit, evidence_of_path, fit_track
 from dqslam.tracks.motion import SPEED, X, Y
 from dqslam.tracks.problem import TrackProblem, Trajectory
 from dqslam.tracks.start import moving_start, resting_starts, rough_places, stopping_start
@@ -24,6 +24,10 @@ PRIOR: dict[Behavior, float] = {"rests": 0.6, "moves": 0.3, "stops and goes": 0.
 MOST_PROBABLY_RESTS = 0.01
 # What is slower than one of these speeds [m/s] may be at rest.
 SLOW = (0.3, 0.6, 1.0, 2.0)
+# It rests in part only if it is so slow there, as a share of its highest speed.
+MAY_REST = 0.4
+# Images at which it may begin, or stop, to move that are tried first.
+_FIRST_SWITCHES = 6
 # A start far from the boxes is first brought near with boxes that are so many times less sure.
 _COARSE = 5.0
 _COARSE_ITERATIONS = 12
@@ -55,8 +59,12 @@ class Judgment:
         return bool(reach > np.exp(self.fit.trajectory.log_half[0]))
 
 
-def judge(problem: TrackProblem) -> Judgment | None:
-    """Compare what a thing may do; None where no hypothesis has an estimate."""
+def judge(problem: TrackProblem, path: Floats | None = None) -> Judgment | None:
+    """Compare what a thing may do; None where no hypothesis has an estimate.
+
+    ``path`` (6 n, 6 n) is the joint covariance of small motions [m, rad] of the cameras, each in
+    its own frame, by default none: a path that errs makes what rests move.
+    """
     count = len(problem.seconds)
     places, weight = rough_places(problem)
     all_along, never = np.ones(count - 1, dtype=np.bool_), np.zeros(count - 1, dtype=np.bool_)
@@ -73,7 +81,10 @@ def judge(problem: TrackProblem) -> Judgment | None:
     if not fits:
         return None
     log_odds = {
-        name: float(np.log(PRIOR[name])) + fit.log_evidence - cost
+        name: float(np.log(PRIOR[name]))
+        + fit.log_evidence
+        - cost
+        + (0.0 if path is None else evidence_of_path(fit, path))
         for name, (fit, _, cost) in fits.items()
     }
     most = max(log_odds.values())
@@ -86,25 +97,45 @@ def judge(problem: TrackProblem) -> Judgment | None:
 
 
 def _stops(problem: TrackProblem, moving: TrackFit) -> tuple[TrackFit, Bools, float] | None:
-    """Return the likeliest estimate with rests, by where the one that moves all along is slow.
+    """Return the likeliest estimate with rests, near where the one that moves all along is slow.
 
-    Each begin and end of a rest may be at any of the images: its evidence is shared among them.
+    It rests where that is slower than some speed; or until, or from, an image on. Each begin and
+    end of a rest may be at any of the images: its evidence is shared among them.
     """
     speed = np.abs(moving.trajectory.state[:, SPEED])
+    count = len(speed)
+    if speed.min() > max(MAY_REST * speed.max(), SLOW[-1]):
+        return None
     best: tuple[TrackFit, Bools, float] | None = None
     tried: set[bytes] = set()
-    for slow in SLOW:
-        moves = ~((speed < slow)[:-1] & (speed < slow)[1:])
+
+    def attempt(moves: Bools) -> None:
+        nonlocal best
         if moves.all() or not moves.any() or moves.tobytes() in tried:
-            continue
+            return
         tried.add(moves.tobytes())
         rests = np.append(~moves, False) | np.append(False, ~moves)
         fit = _fit(problem, stopping_start(moving.trajectory, rests), moves)
-        cost = float(np.sum(moves[1:] != moves[:-1]) * np.log(len(speed)))
+        cost = float(np.sum(moves[1:] != moves[:-1]) * np.log(count))
         if fit is not None and (
             best is None or fit.log_evidence - cost > best[0].log_evidence - best[2]
         ):
             best = fit, moves, cost
+
+    for slow in SLOW:
+        attempt(~((speed < slow)[:-1] & (speed < slow)[1:]))
+    leaves = bool(speed[: count // 2].sum() < speed[-(count // 2) :].sum())
+    images = np.arange(count - 1)
+    step = max((count - 1) // _FIRST_SWITCHES, 1)
+    for switch in range(step, count - 1, step):
+        attempt((images >= switch) if leaves else (images < switch))
+    while best is not None and step > 1:
+        step //= 2
+        now = best[1]
+        if np.sum(now[1:] != now[:-1]) == 1:
+            switch = int(np.flatnonzero(now[1:] != now[:-1])[0]) + 1
+            for other in (switch - step, switch + step):
+                attempt((images >= other) if now[-1] else (images < other))
     return best
 
 

@@ -101,6 +101,8 @@ class Equations:
     """Blocks of each state, and of the size, and the motion of its camera, shape (n, 9, 6)."""
     of_camera: Floats
     """Blocks of these motions, shape (n, 6, 6)."""
+    gradient_camera: Floats
+    """By these motions, shape (n, 6)."""
     log_density: float
     """What the cost lacks of minus the log density of motion and size: minus this."""
     chi2: Floats
@@ -166,6 +168,7 @@ def linearize(
         np.einsum("nki,nk->i", by_size, error) + precision @ off_size,
         both @ by_camera,
         by_camera.transpose(0, 2, 1) @ by_camera,
+        np.einsum("nij,ni->nj", by_camera, error),
         steps.log_density
         - float(np.log(sigmas).sum())
         + 0.5 * float(np.linalg.slogdet(precision)[1]),
@@ -184,6 +187,7 @@ def _only_bounds(problem: TrackProblem, seen: PredictedBoxes) -> Bools:
     size = np.array([camera.width, camera.height]) - 0.5
     outside = ((seen.corner < -0.5) | (seen.corner > size)).any(axis=2)
     outside |= ~seen.is_whole[:, None]
-    cut = problem.truncated | (problem.truncated.any(axis=1)[:, None] & outside)
+    is_cut = np.asarray(problem.truncated.any(axis=1))[:, None]
+    cut = problem.truncated | (is_cut & outside)
     beyond = (seen.box - problem.box) * [-1.0, -1.0, 1.0, 1.0] > 0.0
     return np.asarray((cut & beyond) | (problem.truncated & ~seen.is_whole[:, None]))

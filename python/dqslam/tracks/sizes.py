@@ -42,4 +42,4 @@ def body_size(class_name: str, prior: SizePrior | SizePriors | None = None) -> B
     elif sides is None:
         return None
     covariance = common**2 * np.ones((3, 3)) + own**2 * np.eye(3)
-    return BodySize(log_half, np.linalg.inv(covariance))
+    return BodySize(np.asarray(log_half), np.asarray(np.linalg.inv(covariance)))

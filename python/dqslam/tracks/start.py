@@ -65,11 +65,11 @@ def resting_starts(problem: TrackProblem, places: Floats, weight: Floats) -> lis
 def stopping_start(moving: Trajectory, rests: Floats) -> Trajectory:
     """Start from an estimate that moves all along, at rest in the images that ``rests`` flags (n,).
 
-    Each run of such images has the place and heading of the middle one.
+    Each run of such images has their mean state.
     """
     state = moving.state.copy()
     rows = np.flatnonzero(rests)
     for run in np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1):
-        state[run] = state[run[len(run) // 2]]
+        state[run] = state[run].mean(axis=0)
     state[rows, SPEED] = state[rows, TURN] = 0.0
     return Trajectory(state, moving.log_half.copy())

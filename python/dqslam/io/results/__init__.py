@@ -7,8 +7,9 @@
 ``map.json``        ``objects``: ``id class_name center semi_axes orientation_xyzw dual_quadric
                     observations``, ``doubt`` where its size is not to be believed, and with
                     marginals ``center_covariance`` [m^2] and ``log_semi_axes_sigma``;
-                    ``dropped``: ``id reason``.
+                    ``dropped``: ``id reason``; ``tracks`` of what moves, in short.
 ``covariance.csv``  Covariances of poses, see ``covariances``. Only when marginals are given.
+``tracks.csv``      What moves, see ``tracks``. Only when anything does.
 ``boxes.csv``       A row per box, used or left out, see ``boxes``. Only when boxes are given.
 ==================  ================================================================================
 """

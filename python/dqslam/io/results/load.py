@@ -21,7 +21,9 @@ from dqslam.io.files import FileError, read_text
 from dqslam.io.results.boxes import BoxTable, read_boxes
 from dqslam.io.results.covariances import read_covariances
 from dqslam.io.results.save import NO_POSES
+from dqslam.io.results.tracks import read_tracks
 from dqslam.io.trajectory import Trajectory, read_trajectory
+from dqslam.track import Track
 
 RESULT_FILES = (
     "trajectory.txt",
@@ -30,6 +32,7 @@ RESULT_FILES = (
     "map.json",
     "covariance.csv",
     "boxes.csv",
+    "tracks.csv",
     "report.json",
 )
 _MOST_READINGS = 5
@@ -111,6 +114,8 @@ class Results:
     """The boxes, or None without ``boxes.csv``."""
     report: Mapping[str, Any]
     """The content of ``report.json``, empty without it."""
+    tracks: tuple[Track, ...] = ()
+    """What moves, from ``tracks.csv``; none without it."""
 
     def __repr__(self) -> str:
         """Show where the files are, and how many poses and objects are in them."""
@@ -121,8 +126,8 @@ class Results:
 def load_results(directory: str | Path) -> Results:
     """Read a directory of results.
 
-    ``covariance.csv``, ``boxes.csv`` and ``report.json`` may be absent. If there is a
-    ``manifest.json``, the files are compared with it: for each that has been changed, added or
+    ``covariance.csv``, ``boxes.csv``, ``tracks.csv`` and ``report.json`` may be absent. If there
+    is a ``manifest.json``, the files are compared with it: for each that has been changed, added or
     taken away since they were written, there is a ``ChangedFileWarning``.
 
     Raises
@@ -177,6 +182,7 @@ def _read_results(directory: Path) -> Results:
         raise FileError(directory / "odometry.txt", message)
     covariance = directory / "covariance.csv"
     boxes, report = directory / "boxes.csv", directory / "report.json"
+    tracks = directory / "tracks.csv"
     return Results(
         directory=directory,
         camera=read_camera(directory / "camera.json"),
@@ -189,6 +195,7 @@ def _read_results(directory: Path) -> Results:
         objects=read_map(directory / "map.json"),
         boxes=read_boxes(boxes, times) if boxes.exists() else None,
         report=_read_json(report) if report.exists() else {},
+        tracks=read_tracks(tracks, times) if tracks.exists() else (),
     )
 
 
