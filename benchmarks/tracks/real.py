@@ -51,7 +51,7 @@ def read_labels() -> Labels:
     """Read the labels of the drive, in the world of its reference trajectory."""
     from scipy.spatial.transform import Rotation
 
-    path = io.read_trajectory(_FOLDER / "trajectory_reference.txt").world_from_body
+    path = io.read_trajectory(_FOLDER / "trajectory_reference.txt").world_from_camera
     turns = Rotation.from_quat(path[:, 3:]).as_matrix()
     ids: dict[int, list[int]] = {}
     boxes: dict[int, list[list[float]]] = {}

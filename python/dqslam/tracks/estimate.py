@@ -83,12 +83,12 @@ def estimate_tracks(
             still.append(rows)
         else:
             unknown.append((rows, "whether it moves or rests is open"))
-    scene = _with_ground_of_movers(scene, moving)
+    grounds = _grounds_of_movers(scene, moving)
     tracks = tuple(
-        _track(scene, rows, judged, number, path_covariance)
-        for number, (rows, judged) in enumerate(moving)
+        _track(replace(scene, ground=ground), rows, judged, number, path_covariance)
+        for number, ((rows, judged), ground) in enumerate(zip(moving, grounds[:-1], strict=True))
     )
-    return Tracked(tracks, tuple(still), tuple(unknown), scene.ground, track_of_box)
+    return Tracked(tracks, tuple(still), tuple(unknown), grounds[-1], track_of_box)
 
 
 def _judge(scene: Scene, rows: Ints, path_covariance: PathCovariance) -> Judgment | str:
@@ -105,17 +105,17 @@ def _judge(scene: Scene, rows: Ints, path_covariance: PathCovariance) -> Judgmen
     return "no motion explains its boxes" if judged is None else judged
 
 
-def _with_ground_of_movers(scene: Scene, moving: list[tuple[Ints, Judgment]]) -> Scene:
-    """Return a scene whose ground is corrected by where the things that move stand.
+def _grounds_of_movers(scene: Scene, moving: list[tuple[Ints, Judgment]]) -> list[Ground]:
+    """Return the ground of each thing that moves, as the others correct it, and that by all.
 
     Where each stands without the ground follows from its size. All of them together know the ground
-    under them better than things at rest beside it.
+    under them better than things at rest beside it. What a thing says itself is in its boxes.
     """
     if scene.ground.kind == "unknown" or not moving:
-        return scene
+        return [scene.ground] * (len(moving) + 1)
     loose = replace(scene, ground=scene.ground.of_unknown_height())
-    stands = []
-    for rows, judged in moving:
+    stands = np.zeros((len(moving), 3))
+    for number, (rows, judged) in enumerate(moving):
         problem, fit = _refit(loose, rows, judged)
         state, views = fit.trajectory.state, problem.views
         distance = np.linalg.norm(state[:, X : Y + 1] - views.position[:, :2], axis=1)
@@ -123,8 +123,9 @@ def _with_ground_of_movers(scene: Scene, moving: list[tuple[Ints, Judgment]]) ->
         place = SIZE * row + ABOVE
         sigma = problem.above[row]
         variance = sigma**2 * covariance(fit)[0][place, place]
-        stands.append((sigma * state[row, ABOVE], variance, distance[row]))
-    return replace(scene, ground=scene.ground.corrected(*np.array(stands).T))
+        stands[number] = sigma * state[row, ABOVE], variance, distance[row]
+    others = [np.delete(stands, number, axis=0) for number in range(len(moving))]
+    return [scene.ground.corrected(*some.T) for some in (*others, stands)]
 
 
 def _refit(scene: Scene, rows: Ints, judged: Judgment) -> tuple[TrackProblem, TrackFit]:
