@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from dqslam import Camera
-from dqslam.tracks.body import Views, predict_boxes
+from dqslam.tracks.body import ROUNDED_PX, Views, predict_boxes
 
 CAMERA = Camera(500.0, 510.0, 320.0, 240.0, 640, 480)
 AHEAD = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
@@ -35,7 +35,7 @@ def drawn(seed, count=6):
     return Views(CAMERA, turn, random.normal(size=(count, 3))), foot, random.uniform(-3, 3, count)
 
 
-def test_no_point_of_the_surface_is_outside_of_the_box():
+def test_the_box_is_that_of_the_surface():
     seen_from, foot, heading = drawn(0)
     seen = predict_boxes(seen_from, foot, heading, HALF)
     grid = np.linspace(-1.0, 1.0, 21)
@@ -46,7 +46,8 @@ def test_no_point_of_the_surface_is_outside_of_the_box():
         local = (points - seen_from.position[row]) @ seen_from.rotation[row]
         u = 320 + 500 * local[:, 0] / local[:, 2]
         v = 240 + 510 * local[:, 1] / local[:, 2]
-        np.testing.assert_allclose(seen.box[row], [u.min(), v.min(), u.max(), v.max()])
+        exact = [u.min(), v.min(), u.max(), v.max()]
+        np.testing.assert_allclose(seen.box[row], exact, atol=0.3 * ROUNDED_PX)
 
 
 def test_derivatives_are_those_of_small_differences():

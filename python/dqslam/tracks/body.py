@@ -1,8 +1,9 @@
 """The boxes of cuboids that stand upright, and their derivatives.
 
 A cuboid stands on its foot, the middle of its lower face, and is turned about the vertical by its
-heading, along which its length is. A box reaches to the outermost of its eight corners, and an edge
-changes as that corner does.
+heading, along which its length is. A box reaches to the outermost of its eight corners. Where two
+of them are within a pixel, the edge is between them: it changes smoothly from one to the other, as
+at a car, whose corners are round, and an estimate does not get caught at the kink.
 """
 
 from __future__ import annotations
@@ -16,6 +17,9 @@ from dqslam._checks import Bools, Floats
 
 # A corner nearer to the plane of the camera than this share of its distance has no pixel.
 NEAREST = 1e-3
+# An edge is the mean of the corners, each weighted by exp(its pixels outward / this).
+ROUNDED_PX = 0.5
+_OUTWARD = np.array([-1.0, -1.0, 1.0, 1.0])
 # Of the corners along length and width, each -1 or 1, and along the height from the foot, 0 or 2.
 _SIGNS = np.array([[a, b, c] for a in (-1, 1) for b in (-1, 1) for c in (0, 2)], dtype=np.float64)
 
@@ -81,33 +85,42 @@ def predict_boxes(
         ]
     )
     rows, axis = np.arange(count)[:, None], np.tile([0, 1], 2)
-    box = middle[axis] + focal[axis] * ray[rows, corner, axis]
-    # An edge by its corner in the camera's frame: f / z along its own axis, -f / z ray along z.
-    scale = focal[axis] / np.where(in_front[:, None], depth[rows, corner], 1.0)
-    by_seen = np.zeros((count, 4, 3))
-    by_seen[:, np.arange(4), axis] = scale
-    by_seen[..., 2] = -scale * ray[rows, corner, axis]
-    by_point = by_seen @ views.rotation.transpose(0, 2, 1)
-    arm = turned[rows, corner]
-    by_heading = by_point[..., 1] * arm[..., 0] - by_point[..., 0] * arm[..., 1]
-    forward = np.concatenate([cos, sin], axis=1)[:, None]
-    left = np.concatenate([-sin, cos], axis=1)[:, None]
+    pixel = middle + focal * ray
+    # Of each edge, the weights of the corners, and by them how the edge changes with each.
+    edges = pixel[..., axis].transpose(0, 2, 1)
+    outward = _OUTWARD[:, None] * edges
+    outward = np.where(ahead[:, None], outward, -np.inf)
+    most = outward.max(axis=2, keepdims=True, initial=-np.finfo(np.float64).max)
+    weight = np.exp((outward - most) / ROUNDED_PX)
+    weight /= np.maximum(weight.sum(axis=2, keepdims=True), 1.0)
+    box = np.sum(weight * edges, axis=2)
+    share = weight * (1.0 + _OUTWARD[:, None] * (edges - box[..., None]) / ROUNDED_PX)
+    # A pixel by its corner in the camera's frame: f / z along its own axis, -f / z ray along z.
+    scale = share * focal[axis][:, None] / np.where(ahead, depth, 1.0)[:, None]
+    by_seen = np.zeros((count, 4, 8, 3))
+    by_seen[:, np.arange(4), :, axis] = scale.transpose(1, 0, 2)
+    by_seen[..., 2] = -scale * ray[..., axis].transpose(0, 2, 1)
+    by_point = by_seen @ views.rotation.transpose(0, 2, 1)[:, None]
+    x, y, z = by_point.transpose(3, 0, 1, 2)
+    arm = turned[:, None]
+    by_heading = np.sum(y * arm[..., 0] - x * arm[..., 1], axis=2)
     by_size = np.stack(
         [
-            np.sum(by_point[..., :2] * forward, axis=2) * along[corner],
-            np.sum(by_point[..., :2] * left, axis=2) * across[corner],
-            by_point[..., 2] * height[corner],
+            np.sum((x * cos[:, :, None] + y * sin[:, :, None]) * along, axis=2),
+            np.sum((y * cos[:, :, None] - x * sin[:, :, None]) * across, axis=2),
+            np.sum(z * height, axis=2),
         ],
         axis=2,
     )
-    by_turn = np.cross(by_seen, -seen[rows, corner])
+    by_turn = np.cross(by_seen, -seen[:, None]).sum(axis=2)
+    by_foot, by_shift = by_point.sum(axis=2), by_seen.sum(axis=2)
     box[~in_front] = np.nan
     return PredictedBoxes(
         box,
         in_front,
         ahead.all(axis=1),
-        middle + focal * ray[rows, corner],
-        np.concatenate([by_point, by_heading[..., None]], axis=2),
+        pixel[rows, corner],
+        np.concatenate([by_foot, by_heading[..., None]], axis=2),
         by_size,
-        np.concatenate([-by_seen, -by_turn], axis=2),
+        np.concatenate([-by_shift, -by_turn], axis=2),
     )

@@ -14,12 +14,12 @@ from dqslam.assumptions import BoxNoise, SizePrior, SizePriors
 from dqslam.assumptions.traffic import usual_sides
 from dqslam.recording import Recording
 from dqslam.tracks.body import Views
-from dqslam.tracks.fit import fit_track
+from dqslam.tracks.fit import covariance, fit_track
 from dqslam.tracks.ground import Feet, Ground, feet_of_boxes, feet_of_ellipsoids, find_ground
 from dqslam.tracks.motion import ABOVE, HEADING, X, Y, motion_noise
-from dqslam.tracks.motion import SIZE as STATE_SIZE
+from dqslam.tracks.motion import SIZE as SIZE_OF_STATE
 from dqslam.tracks.problem import TrackProblem, Trajectory
-from dqslam.tracks.sizes import BodySize, body_size
+from dqslam.tracks.sizes import COMMON_SIGMA, OWN_SIGMA, BodySize, body_size
 
 # Two images tell a speed, but not whether it is one.
 FEWEST_IMAGES = 4
@@ -92,6 +92,7 @@ def make_scene(
     """
     cameras = _core.world_from_camera(recording.odometry.pose_model, recording.camera, poses)
     unknown = find_ground(cameras, NO_FEET)
+    up = unknown.world_from_ground[:, 2]
     scene = Scene(recording, cameras, unknown, box_noise, size_prior)
     pose = recording.detections.pose
     shown = [
@@ -99,32 +100,36 @@ def make_scene(
         for row in np.unique(object_rows[object_rows >= 0]).tolist()
     ]
     feet = [_foot(scene, ellipsoids[object_rows[rows[0]]], rows) for rows in shown]
-    found = Feet(
-        np.repeat(np.arange(len(shown)), [len(rows) for rows in shown]),
-        np.concatenate([*(pose[rows] for rows in shown), np.zeros(0, dtype=np.int64)]),
-        np.concatenate(
-            [
-                *(np.tile(foot, (len(rows), 1)) for foot, rows in zip(feet, shown, strict=True)),
-                np.zeros((0, 3)),
-            ]
-        ),
-    )
+    counts = [len(rows) for rows in shown]
+    found = NO_FEET
+    if shown:
+        found = Feet(
+            np.repeat(np.arange(len(shown)), counts),
+            pose[np.concatenate(shown)],
+            np.repeat([place for place, _ in feet], counts, axis=0),
+            np.repeat([sigma for _, sigma in feet], counts),
+        )
     if len(shown) < FEWEST_RESTING:
-        found = _feet_of_known_classes(recording, cameras, len(shown), found)
+        found = _feet_of_known_classes(recording, cameras, up, len(shown), found)
     return replace(scene, ground=find_ground(cameras, found))
 
 
-NO_FEET = Feet(np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros((0, 3)))
+NO_FEET = Feet(*np.zeros((2, 0), dtype=np.int64), np.zeros((0, 3)), np.zeros(0))
 # So many things at rest tell the ground without the help of classes.
 FEWEST_RESTING = 5
+# The lower end of an ellipsoid is off the foot by about so much [m], ...
+SIGMA_OF_END_M = 0.1
+# ... and the height of a camera by the height of a class by this share.
+SHARE_OF_CLASS = float(np.hypot(COMMON_SIGMA, OWN_SIGMA))
 # So many boxes of a thing at rest are enough to tell where it stands, and so many iterations.
 _BOXES_OF_FOOT, _ITERATIONS_OF_FOOT = 20, 15
 
 
-def _foot(scene: Scene, ellipsoid: Floats, rows: Ints) -> Floats:
-    """Return where a thing at rest stands, (3,): as a cuboid of its class, or the ellipsoid's end.
+def _foot(scene: Scene, ellipsoid: Floats, rows: Ints) -> tuple[Floats, float]:
+    """Return where a thing at rest stands, (3,), and the sigma of its height [m].
 
-    The lower end of an ellipsoid that explains the boxes of a car is below the car's.
+    It stands as a cuboid of its class does, or else at the lower end of the ellipsoid. That of an
+    ellipsoid that explains the boxes of a car is below the car's.
     """
     from scipy.spatial.transform import Rotation
 
@@ -133,10 +138,10 @@ def _foot(scene: Scene, ellipsoid: Floats, rows: Ints) -> Floats:
     rows = one_an_image(scene.recording, rows)
     size = scene.size(scene.class_name(rows)) if rows.size else None
     if size is None or len(rows) < 2:
-        return np.asarray(lowest)
+        return lowest, SIGMA_OF_END_M
     rows = thinned(rows, most=_BOXES_OF_FOOT)
     problem = scene.problem(rows, size, scene.class_name(rows))
-    state = np.zeros((len(rows), STATE_SIZE))
+    state = np.zeros((len(rows), SIZE_OF_STATE))
     state[:, X : Y + 1] = lowest @ turn[:, :2]
     state[:, ABOVE] = (lowest @ turn[:, 2] - problem.plane[:, 0]) / problem.above
     orientation = _core.axes_from_ellipsoid(ellipsoid)[2]
@@ -146,8 +151,10 @@ def _foot(scene: Scene, ellipsoid: Floats, rows: Ints) -> Floats:
     start = Trajectory(state, size.log_half)
     fit = fit_track(problem, start, still, max_iterations=_ITERATIONS_OF_FOOT)
     if fit is None:
-        return np.asarray(lowest)
-    return np.asarray(turn @ np.median(problem.feet(fit.trajectory.state), axis=0))
+        return lowest, SIGMA_OF_END_M
+    middle = SIZE_OF_STATE * (len(rows) // 2) + ABOVE
+    sigma = problem.above[0] * float(np.sqrt(covariance(fit)[0][middle, middle]))
+    return turn @ np.median(problem.feet(fit.trajectory.state), axis=0), sigma
 
 
 def one_an_image(recording: Recording, rows: Ints) -> Ints:
@@ -157,10 +164,12 @@ def one_an_image(recording: Recording, rows: Ints) -> Ints:
     return rows[np.diff(detections.pose[rows], prepend=-1) > 0]
 
 
-def _feet_of_known_classes(recording: Recording, cameras: Floats, known: int, feet: Feet) -> Feet:
+def _feet_of_known_classes(
+    recording: Recording, cameras: Floats, up: Floats, known: int, feet: Feet
+) -> Feet:
     """Add where things of known height stand by their boxes to the feet of ``known`` things.
 
-    Each box is a thing by itself.
+    Each box is a thing by itself. ``up`` is a unit vector in the world, (3,).
     """
     detections = recording.detections
     sides = {number: usual_sides(name) for number, name in detections.class_names.items()}
@@ -171,11 +180,14 @@ def _feet_of_known_classes(recording: Recording, cameras: Floats, known: int, fe
     images = detections.pose[usable]
     seen_from = cameras[detections.pose]
     place = feet_of_boxes(recording.camera, seen_from, detections.box, usable, heights)
-    near = np.linalg.norm(place - cameras[images, :3], axis=1) < _NEAR_M
+    run = place - cameras[images, :3]
+    near = np.linalg.norm(run, axis=1) < _NEAR_M
+    drop = np.abs(run[near] @ up)
     return Feet(
         np.append(feet.thing, known + np.arange(near.sum())),
         np.append(feet.image, images[near]),
         np.concatenate([feet.place, place[near]]),
+        np.append(feet.sigma, SHARE_OF_CLASS * drop),
     )
 
 

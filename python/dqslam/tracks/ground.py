@@ -103,6 +103,8 @@ class Feet:
     """Row of the pose, shape (f,)."""
     place: Floats
     """In the world, meters, shape (f, 3)."""
+    sigma: Floats
+    """Of its height, by the boxes of the thing, meters, shape (f,)."""
 
 
 def find_ground(cameras: Floats, feet: Feet) -> Ground:
@@ -123,7 +125,7 @@ def find_ground(cameras: Floats, feet: Feet) -> Ground:
     distance = np.linalg.norm(toward, axis=1)
     share = 1.0 / np.bincount(feet.thing)[feet.thing]
     normal, turned_sigma = _normal_in_camera(cameras, axes, up)
-    normal, off_camera = _turned(normal, turned_sigma, toward, distance, share)
+    normal, off_camera = _turned(normal, turned_sigma, toward, distance, share, feet.sigma)
     off_world = feet.place @ up
     choices: list[tuple[float, Ground]] = []
     kinds: tuple[tuple[GroundKind, float, Floats, Floats], ...] = (
@@ -131,11 +133,11 @@ def find_ground(cameras: Floats, feet: Feet) -> Ground:
         ("level", 1.0, np.eye(3)[2], off_world),
     )
     for kind, way, own, off in kinds:
-        middle = _weighted_median(off, share)
+        middle = _weighted_median(off, share / (LEAST_SIGMA_M**2 + feet.sigma**2))
         away = np.abs(off - middle)
         scatter = _weighted_median(away, share)
-        sigma, slope = _spread(away, distance, share)
-        weight = share / (sigma**2 + (slope * distance) ** 2)
+        sigma, slope = _spread(away, distance, share, feet.sigma)
+        weight = share / (sigma**2 + (slope * distance) ** 2 + feet.sigma**2)
         if kind == "below the camera":  # how it is turned is as unknown as how high it is
             columns, prior = _columns(normal, turned_sigma, toward)
             variance = np.linalg.inv(columns.T @ (weight[:, None] * columns) + prior)[2, 2]
@@ -179,16 +181,21 @@ def _columns(normal: Floats, turned_sigma: float, toward: Floats) -> tuple[Float
 
 
 def _turned(
-    normal: Floats, turned_sigma: float, toward: Floats, distance: Floats, share: Floats
+    normal: Floats,
+    turned_sigma: float,
+    toward: Floats,
+    distance: Floats,
+    share: Floats,
+    own: Floats,
 ) -> tuple[Floats, Floats]:
     """Turn a normal in the camera's frame to where feet (f, 3) there are on one plane.
 
     Returns the normal and the coordinates of the feet along it [m], (f,). Feet count by their share
-    and their distance, and less the further they are off.
+    and their sigmas, ``own`` [m] among them, and less the further they are off.
     """
     basis = np.linalg.svd(normal[None])[2][1:]
     columns, prior = _columns(normal, turned_sigma, toward)
-    sigma = np.hypot(LEAST_SIGMA_M, 2.0 * LEAST_SLOPE * distance)
+    sigma = np.sqrt(LEAST_SIGMA_M**2 + (2.0 * LEAST_SLOPE * distance) ** 2 + own**2)
     weight, found = share / sigma**2, np.zeros(3)
     for _ in range(_ROUNDS):
         right = -columns.T @ (weight * (toward @ normal))
@@ -200,20 +207,21 @@ def _turned(
     return turned, toward @ turned
 
 
-def _spread(away: Floats, distance: Floats, share: Floats) -> tuple[float, float]:
+def _spread(away: Floats, distance: Floats, share: Floats, own: Floats) -> tuple[float, float]:
     """Return the sigma [m] near the camera and its growth, by how far feet are off [m], (f,).
 
     Half of the feet of a normal are off by less than 0.6745 sigma. The growth is that of the
-    farther half of them.
+    farther half of them. ``own`` [m] are the sigmas that explain a part of it, (f,).
     """
     far = distance > _weighted_median(distance, share)
     slope = LEAST_SLOPE
     if far.any():
-        slope = max(slope, _weighted_median(away[far] / distance[far], share[far]) / 0.6745)
+        beyond = np.sqrt(np.maximum(away**2 - (0.6745 * own) ** 2, 0.0)) / distance
+        slope = max(slope, _weighted_median(beyond[far], share[far]) / 0.6745)
     sigma = LEAST_SIGMA_M
     for _ in range(_ROUNDS):
-        own = np.hypot(sigma, slope * distance)
-        sigma *= max(_weighted_median(away / own, share) / 0.6745, LEAST_SIGMA_M / sigma)
+        whole = np.sqrt(sigma**2 + (slope * distance) ** 2 + own**2)
+        sigma *= max(_weighted_median(away / whole, share) / 0.6745, LEAST_SIGMA_M / sigma)
     return float(sigma), float(slope)
 
 

@@ -16,7 +16,13 @@ from dqslam.track import Behavior
 from dqslam.tracks.fit import TrackFit, evidence_of_path, fit_track
 from dqslam.tracks.motion import SPEED, X, Y
 from dqslam.tracks.problem import TrackProblem, Trajectory
-from dqslam.tracks.start import moving_start, resting_starts, rough_places, stopping_start
+from dqslam.tracks.start import (
+    mirrored_start,
+    moving_start,
+    resting_starts,
+    rough_places,
+    stopping_start,
+)
 
 # What of things that are seen is at rest, moves, and does both, before their boxes say more.
 PRIOR: dict[Behavior, float] = {"rests": 0.6, "moves": 0.3, "stops and goes": 0.1}
@@ -28,9 +34,9 @@ SLOW = (0.3, 0.6, 1.0, 2.0)
 MAY_REST = 0.4
 # Images at which it may begin, or stop, to move that are tried first.
 _FIRST_SWITCHES = 6
-# A start far from the boxes is first brought near with boxes that are so many times less sure.
-_COARSE = 5.0
-_COARSE_ITERATIONS = 12
+# A start far from the boxes is brought near with boxes whose sigmas are so many times larger.
+_LESS_SURE = (20.0, 4.0)
+_COARSE_ITERATIONS = 15
 # Of a thing at rest, so many boxes tell which start is near.
 _FEW = 10
 
@@ -70,6 +76,10 @@ def judge(problem: TrackProblem, path: Floats | None = None) -> Judgment | None:
     all_along, never = np.ones(count - 1, dtype=np.bool_), np.zeros(count - 1, dtype=np.bool_)
     fits: dict[Behavior, tuple[TrackFit, Bools, float]] = {}
     moving = _fit(problem, moving_start(problem, places, weight), all_along)
+    if moving is not None:
+        other = fit_track(problem, mirrored_start(problem, moving.trajectory), all_along)
+        if other is not None and other.log_evidence > moving.log_evidence:
+            moving = other
     resting = _rest(problem, resting_starts(problem, places, weight))
     if resting is not None:
         fits["rests"] = resting, never, 0.0
@@ -140,10 +150,15 @@ def _stops(problem: TrackProblem, moving: TrackFit) -> tuple[TrackFit, Bools, fl
 
 
 def _fit(problem: TrackProblem, start: Trajectory, moves: Bools) -> TrackFit | None:
-    """Fit from a start that may be far off."""
-    coarse = replace(problem, variance=problem.variance * _COARSE**2)
-    near = fit_track(coarse, start, moves, max_iterations=_COARSE_ITERATIONS)
-    return None if near is None else fit_track(problem, near.trajectory, moves)
+    """Fit from a start that may be far off: first with boxes that are less sure."""
+    at = start
+    for less_sure in _LESS_SURE:
+        coarse = replace(problem, variance=problem.variance * less_sure**2)
+        near = fit_track(coarse, at, moves, max_iterations=_COARSE_ITERATIONS)
+        if near is None:
+            return None
+        at = near.trajectory
+    return fit_track(problem, at, moves)
 
 
 def _rest(problem: TrackProblem, starts: list[Trajectory]) -> TrackFit | None:
@@ -152,7 +167,7 @@ def _rest(problem: TrackProblem, starts: list[Trajectory]) -> TrackFit | None:
     some = np.zeros(count, dtype=np.bool_)
     some[np.linspace(0, count - 1, min(count, _FEW)).round().astype(int)] = True
     few = problem.select(some)
-    few = replace(few, variance=few.variance * _COARSE**2)
+    few = replace(few, variance=few.variance * _LESS_SURE[-1] ** 2)
     still = np.zeros(some.sum() - 1, dtype=np.bool_)
     fits = [
         fit_track(

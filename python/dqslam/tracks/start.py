@@ -51,6 +51,18 @@ def moving_start(problem: TrackProblem, places: Floats, weight: Floats) -> Traje
     return Trajectory(state, problem.size.log_half.copy())
 
 
+def mirrored_start(problem: TrackProblem, moving: Trajectory) -> Trajectory:
+    """Start from an estimate that moves, turned the other way: a cuboid looks nearly the same."""
+    state = moving.state.copy()
+    line = state[:, X : Y + 1] - problem.views.position[:, :2]
+    sight = np.arctan2(line[:, 1], line[:, 0])
+    away = state[:, HEADING] - sight
+    away = np.unwrap(np.arctan2(np.sin(away), np.cos(away)))
+    state[:, HEADING] = np.unwrap(sight) - away
+    state[:, TURN] *= -1.0
+    return Trajectory(state, moving.log_half.copy())
+
+
 def resting_starts(problem: TrackProblem, places: Floats, weight: Floats) -> list[Trajectory]:
     """Start at the middle of the rough places (n, 2), and at the nearest one, in some headings."""
     starts = []
