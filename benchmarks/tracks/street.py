@@ -114,7 +114,7 @@ def _drive(kind: str, random: Generator) -> tuple[Floats, Floats, Floats]:
         "oncoming": (random.uniform(60.0, 90.0), 3.5, np.pi, random.uniform(8.0, 14.0), 0.0),
         "following": (random.uniform(12.0, 25.0), 0.0, 0.0, random.uniform(6.0, 10.0), 0.0),
         "crossing": (random.uniform(40.0, 55.0), -14.0, np.pi / 2, random.uniform(5.0, 9.0), 0.0),
-        "leaving": (random.uniform(40.0, 55.0), -3.5, 0.0, 0.0, random.uniform(0.8, 1.5)),
+        "leaving": (random.uniform(40.0, 55.0), -3.5, 0.0, 0.0, random.uniform(1.3, 2.2)),
         "parked": (random.uniform(40.0, 60.0), -3.5, 0.0, 0.0, np.inf),
     }[kind]
     turn, state = 0.0, np.zeros((count, 4))

@@ -55,7 +55,7 @@ def test_the_ground_of_a_camera_in_the_hand_is_level():
     random = np.random.default_rng(1)
     poses = np.zeros((40, 7))
     poses[:, :3] = random.uniform(-1, 1, (40, 3)) + [0.0, 0.0, 1.5]
-    turns = Rotation.from_euler("z", random.uniform(-3, 3, 40)).as_matrix()
+    turns = Rotation.from_euler("z", random.uniform(-3, 3, (40, 1))).as_matrix()
     poses[:, 3:] = Rotation.from_matrix(turns @ AHEAD).as_quat()
     place = np.column_stack([random.uniform(-4, 4, (10, 2)), 0.25 + 0.01 * random.normal(size=10)])
     feet = Feet(
