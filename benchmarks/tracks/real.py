@@ -13,7 +13,7 @@ import typer
 
 import dqslam as dq
 from dqslam import io
-from dqslam._checks import Floats
+from dqslam._checks import Floats, Ints
 from dqslam.metrics import box_iou
 
 _FOLDER = Path(os.environ.get("DQSLAM_REALDATA", "../shared/realdata")) / "kitti_tracking" / "0005"
@@ -76,7 +76,7 @@ def read_labels() -> Labels:
     return Labels(ids, {key: np.array(one) for key, one in boxes.items()}, places, moving, path)
 
 
-def label_of(labels: Labels, images: Floats, boxes: Floats) -> int | None:
+def label_of(labels: Labels, images: Ints, boxes: Floats) -> int | None:
     """Return the label that most of some boxes (n, 4) show, None if they show none."""
     votes: Counter[int] = Counter()
     for image, box in zip(images.tolist(), boxes, strict=True):

@@ -37,7 +37,7 @@ def track_street(street: Street) -> Outcome:
 
     def joint(images: Ints) -> Floats:
         rows = (6 * images[:, None] + np.arange(6)).ravel()
-        return street.path_covariance[np.ix_(rows, rows)]
+        return np.asarray(street.path_covariance[np.ix_(rows, rows)])
 
     found = estimate_tracks(
         street.recording,

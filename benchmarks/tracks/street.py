@@ -80,7 +80,7 @@ def make_street(kind: str, seed: int) -> Street:
     detections = dq.Detections(
         pose, box, np.ones(count), np.zeros(count, dtype=int), ids, {0: "car"}, truncated
     )
-    times = SECONDS * np.arange(IMAGES)
+    times = np.asarray(SECONDS * np.arange(IMAGES), dtype=np.float64)
     reckoned = _core.dead_reckon(dq.PoseModel.SE3, path[0], noisy)
     return Street(
         dq.Recording(CAMERA, times, odometry, detections),

@@ -114,7 +114,8 @@ def make_scene(
     return replace(scene, ground=find_ground(cameras, found))
 
 
-NO_FEET = Feet(*np.zeros((2, 0), dtype=np.int64), np.zeros((0, 3)), np.zeros(0))
+_NOTHING = np.zeros(0, dtype=np.int64)
+NO_FEET = Feet(_NOTHING, _NOTHING, np.zeros((0, 3)), np.zeros(0))
 # So many things at rest tell the ground without the help of classes.
 FEWEST_RESTING = 5
 # The lower end of an ellipsoid is off the foot by about so much [m], ...
