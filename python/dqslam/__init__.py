@@ -22,6 +22,7 @@ if TYPE_CHECKING:  # the one list of public names, a line each: lazy_exports rea
     from dqslam import simulation as simulation
     from dqslam import studies as studies
     from dqslam import surface as surface
+    from dqslam import tracks as tracks
     from dqslam import view as view
     from dqslam._core import Backend as Backend
     from dqslam._core import Camera as Camera
@@ -129,6 +130,7 @@ if TYPE_CHECKING:  # the one list of public names, a line each: lazy_exports rea
     from dqslam.surface import SurfaceOptions as SurfaceOptions
     from dqslam.surface import Surfaces as Surfaces
     from dqslam.surface import fuse_surfaces as fuse_surfaces
+    from dqslam.track import Track as Track
     from dqslam.uncertainty import Bound as Bound
     from dqslam.uncertainty import Marginals as Marginals
     from dqslam.uncertainty import UnderConstrained as UnderConstrained

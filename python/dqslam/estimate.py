@@ -16,6 +16,7 @@ from dqslam._core import (
 )
 from dqslam._repr import counted
 from dqslam.solids import MOMENTS, Solids, body_solids
+from dqslam.track import Track
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +71,8 @@ class Estimate:
     contradicted: Mapping[int, str] = field(default_factory=dict)
     """Mapped objects that their own boxes contradict, with the reason, by id: most of their boxes
     do not fit, or they are where another object is. Their ids are likely wrong."""
+    tracks: tuple[Track, ...] = ()
+    """What moves, which is not in the map."""
 
     def __repr__(self) -> str:
         """Show the pose model, and how many poses and objects there are."""
@@ -79,6 +82,8 @@ class Estimate:
             parts.append(f"{len(self.dropped)} dropped")
         if self.contradicted:
             parts.append(f"{len(self.contradicted)} contradicted")
+        if self.tracks:
+            parts.append(counted(len(self.tracks), "track"))
         return f"Estimate({', '.join(parts)})"
 
     @property

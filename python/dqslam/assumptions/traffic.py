@@ -10,6 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
+from dqslam._checks import Floats
+
 # An ellipsoid that explains the boxes of a box-shaped object is larger than the inscribed one: by a
 # factor of 4/pi horizontally, if it is seen from all around, but not in height.
 SWELLING = float((4.0 / np.pi) ** (2.0 / 3.0))
@@ -20,17 +22,21 @@ def usual_size(class_name: str) -> float | None:
 
     The semi-axes are those of the ellipsoids that explain the boxes of the class.
     """
+    sides = usual_sides(class_name)
+    return None if sides is None else float(np.log(SWELLING * sides / 2).mean())
+
+
+def usual_sides(class_name: str) -> Floats | None:
+    """Return length, width and height [m] of a moving class, shape (3,); None for other classes."""
     return _table().get(class_name.lower())
 
 
 @cache
-def _table() -> dict[str, float]:
+def _table() -> dict[str, Floats]:
     here = Path(__file__).resolve()
     # The file is in the installed package or in a checkout.
     roots = (here.parents[1], here.parents[3])
     places = [root / "data" / "sizes" / "traffic.toml" for root in roots]
     file = next(place for place in places if place.is_file())
     sizes = tomllib.loads(file.read_text(encoding="utf-8"))["size_m"]
-    return {
-        name: float(np.log(SWELLING * np.array(size) / 2).mean()) for name, size in sizes.items()
-    }
+    return {name: np.array(size, dtype=np.float64) for name, size in sizes.items()}

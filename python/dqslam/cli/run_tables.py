@@ -15,6 +15,9 @@ def show_report(output: Output, report: dict[str, Any]) -> None:
         output.table(_objects(report["objects"]))
         if any(entry["doubt"] is not None for entry in report["objects"]):
             output.line("? the size or shape is not to be believed: see the warnings")
+    tracks = report["tracks"]
+    if tracks is not None and tracks["moving"]:
+        output.table(_moving(tracks["moving"]))
     lines = [f"object {name} is not in the map: {why}" for name, why in _dropped(report)]
     lines += [f"under-constrained: {sentence}" for sentence in report["under_constrained"]]
     if report["solver"] is None:
@@ -186,5 +189,33 @@ def _objects(objects: list[dict[str, Any]]) -> "Table":
             *([entry["shape"] or "none"] if has_shapes else []),
             "none" if entry["chi2_median"] is None else f"{entry['chi2_median']:.2f}",
             "none" if entry["outlier_share"] is None else f"{entry['outlier_share']:.0%}",
+        )
+    return table
+
+
+def _moving(moving: list[dict[str, Any]]) -> "Table":
+    from rich.box import SIMPLE_HEAD
+    from rich.markup import escape
+    from rich.table import Table
+
+    table = Table(box=SIMPLE_HEAD, title="what moves")
+    headings = (
+        *("track", "class", "does", "images", "from [s]", "to [s]"),
+        *("path [m]", "speed [m/s]", "±", "size [m]"),
+    )
+    for heading in headings:
+        table.add_column(heading, justify="left" if heading in ("class", "does") else "right")
+    for one in moving:
+        table.add_row(
+            str(one["id"]),
+            escape(one["class_name"]),
+            one["behavior"],
+            str(one["images"]),
+            f"{one['first_s']:.6g}",
+            f"{one['last_s']:.6g}",
+            f"{one['length_of_path_m']:.3g}",
+            f"{one['speed_median_m_s']:.2g}",
+            f"{one['speed_sigma_m_s']:.2g}",
+            " x ".join(f"{side:.2g}" for side in one["sides_m"]),
         )
     return table

@@ -22,6 +22,7 @@ from dqslam.estimate import Estimate
 from dqslam.graph import Graph, solve
 from dqslam.pipeline.conclude import EstimatorOutput
 from dqslam.pipeline.lens import with_exact_boxes
+from dqslam.pipeline.moving import without_movers
 from dqslam.pipeline.options import Progress, RunOptions
 from dqslam.pipeline.report import describe_evidence
 from dqslam.recording import Recording
@@ -55,6 +56,7 @@ def estimate_batch(
         estimates_noise=options.estimates_noise,
         progress=lambda share: progress(share, ""),
     )
+    found = without_movers(found, options)
     seen = recording.detections
     detections = replace(seen, truncated=seen.truncated | found.hidden)
     recording = replace(recording, detections=detections)

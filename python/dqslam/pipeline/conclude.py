@@ -37,8 +37,10 @@ from dqslam.pipeline.report import (
     warn_of_doubtful,
     warn_of_evidence,
 )
+from dqslam.pipeline.report_tracks import describe_tracks
 from dqslam.pipeline.shape_choice import warn_of_shapes
 from dqslam.recording import Detections
+from dqslam.tracks import Tracked
 from dqslam.uncertainty import Marginals
 
 
@@ -84,6 +86,8 @@ class EstimatorOutput:
     """What was estimated of them, and used."""
     live_poses: Floats | None = None
     """Of a session, before its last polish: world_from_robot, shape (n, d)."""
+    tracked: Tracked | None = None
+    """What moves; None where no box may show it."""
     step_ms: Floats | None = None
     """Of a session: wall clock of each step, shape (n,)."""
     took_part: Bools | None = None
@@ -178,6 +182,7 @@ def conclude(
         "shapes": output.shapes,
         "placements": output.placements,
         "dropped_objects": {str(name): why for name, why in estimate.dropped.items()},
+        "tracks": describe_tracks(output.tracked, boxes.select(~held_out), estimate.timestamps),
         "size_prior": describe_size_prior(output.size_prior),
         "reprojection": describe_overlap(overlap) | {"held_out": tests_held_out},
         "box_noise": describe_box_noise(output.box_noise, output.repeated),

@@ -55,9 +55,9 @@ def run_files(
         to it, if any was.
     out
         Directory to write the results into: trajectory.txt, odometry.txt, map.json, boxes.csv,
-        covariance.csv, camera.json, graph.npz, report.json, and manifest.json with their SHA-256.
-        It must be new, empty, or of an earlier run, whose files all go at once when the new ones
-        are there; by default nothing is written.
+        tracks.csv if anything moves, covariance.csv, camera.json, graph.npz, report.json, and
+        manifest.json with their SHA-256. It must be new, empty, or of an earlier run, whose files
+        all go at once when the new ones are there; by default nothing is written.
     beside
         Texts to write with them, by the names of their files.
 

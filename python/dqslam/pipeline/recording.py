@@ -19,6 +19,7 @@ from dqslam.pipeline.conclude import RunResult, conclude
 from dqslam.pipeline.hold_out import choose_held_out
 from dqslam.pipeline.lens import widened
 from dqslam.pipeline.measurements import usable_measurements, with_measurements
+from dqslam.pipeline.moving import with_tracks
 from dqslam.pipeline.online import estimate_online
 from dqslam.pipeline.options import Progress, RunOptions
 from dqslam.pipeline.placements import with_placements
@@ -110,6 +111,7 @@ def run(
         calibrated = known
         output = with_measurements(estimator(bare, options, progress), known, options)
     output = with_placements(with_shapes(output, calibrated, options), calibrated, options)
+    output = with_tracks(output, replace(calibrated, detections=known.detections), options)
     output = replace(output, remarks=(*output.remarks, *remarks))
     # Boxes are judged as the calibration corrects them, and returned as they were given.
     shift = np.zeros((len(boxes), 4))

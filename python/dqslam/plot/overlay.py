@@ -16,6 +16,7 @@ from dqslam.metrics import projected_edges, visible_outlines
 from dqslam.plot.frame import draw_boxes
 from dqslam.plot.labels import place_labels
 from dqslam.plot.style import column_style, new_figure, save_figure, shown_name
+from dqslam.plot.tracks import draw_track_cuboids
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -86,6 +87,7 @@ class Overlay:
             )
         here = self._results.poses[pose]
         rows, outlines = visible_outlines(self._results.camera, here, self._solids, lens=True)
+        draw_track_cuboids(axes, camera, here, self._results.tracks, pose, self._scale)
         seen = np.isin(rows, detected)
         for row, outline, is_detected in zip(rows, outlines, seen, strict=True):
             self._draw_object(axes, int(row), outline, is_detected=bool(is_detected))

@@ -24,6 +24,7 @@ from dqslam.plot.style import (
     say_frame,
     shown_name,
 )
+from dqslam.plot.tracks import TRACK, draw_tracks
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -98,6 +99,7 @@ def draw_results_map(results: Results, truth: MapTruth | None = None) -> "Figure
         for one in true_outlines:
             axes.fill(*one, facecolor=TRUTH, alpha=0.35, linewidth=0, zorder=1.5)
         _draw_objects(axes, view, results.objects, move, outlines, colors)
+        draw_tracks(axes, view, results.tracks, move)
         _draw_legend(figure, entries)
         place_labels(
             axes,
@@ -215,6 +217,8 @@ def _legend_entries(results: Results, truth: MapTruth | None) -> list[Any]:
     if truth is not None:
         entries.append(Line2D([], [], **_TRUE_PATH))
     entries.append(Line2D([], [], color="black", marker="o", markersize=2.5, lw=0, label="start"))
+    if results.tracks:
+        entries.append(Line2D([], [], label="what moves", **TRACK))
     if (
         np.isfinite(results.covariances).any()
         or np.isfinite(results.objects.center_covariances).any()

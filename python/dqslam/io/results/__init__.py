@@ -9,8 +9,9 @@
                     cuboid or a cylinder, ``doubt`` where its size is not to be believed, and with
                     marginals ``center_covariance`` [m^2], ``log_semi_axes_sigma`` and
                     ``log_half_lengths_sigma``;
-                    ``dropped``: ``id reason``.
+                    ``dropped``: ``id reason``; ``tracks`` of what moves, in short.
 ``covariance.csv``  Covariances of poses, see ``covariances``. Only when marginals are given.
+``tracks.csv``      What moves, see ``tracks``. Only when anything does.
 ``boxes.csv``       A row per box, used or left out, see ``boxes``. Only when boxes are given.
 ``graph.npz``       The problem that was solved, see ``graph_file``. Only when it is given.
 ==================  ================================================================================

@@ -22,8 +22,10 @@ from dqslam.io.results.boxes import BoxTable, read_boxes
 from dqslam.io.results.covariances import read_covariances
 from dqslam.io.results.graph_file import GRAPH_FILE
 from dqslam.io.results.save import NO_POSES
+from dqslam.io.results.tracks import read_tracks
 from dqslam.io.trajectory import Trajectory, read_trajectory
 from dqslam.solids import Solids, body_solids
+from dqslam.track import Track
 
 RESULT_FILES = (
     "trajectory.txt",
@@ -32,6 +34,7 @@ RESULT_FILES = (
     "map.json",
     "covariance.csv",
     "boxes.csv",
+    "tracks.csv",
     "report.json",
     GRAPH_FILE,
 )
@@ -149,6 +152,8 @@ class Results:
     """The boxes, or None without ``boxes.csv``."""
     report: Mapping[str, Any]
     """The content of ``report.json``, empty without it."""
+    tracks: tuple[Track, ...] = ()
+    """What moves, from ``tracks.csv``; none without it."""
 
     def __repr__(self) -> str:
         """Show where the files are, and how many poses and objects are in them."""
@@ -159,8 +164,8 @@ class Results:
 def load_results(directory: str | Path) -> Results:
     """Read a directory of results.
 
-    ``covariance.csv``, ``boxes.csv`` and ``report.json`` may be absent. If there is a
-    ``manifest.json``, the files are compared with it: for each that has been changed, added or
+    ``covariance.csv``, ``boxes.csv``, ``tracks.csv`` and ``report.json`` may be absent. If there
+    is a ``manifest.json``, the files are compared with it: for each that has been changed, added or
     taken away since they were written, there is a ``ChangedFileWarning``.
 
     Raises
@@ -215,6 +220,7 @@ def _read_results(directory: Path) -> Results:
         raise FileError(directory / "odometry.txt", message)
     covariance = directory / "covariance.csv"
     boxes, report = directory / "boxes.csv", directory / "report.json"
+    tracks = directory / "tracks.csv"
     return Results(
         directory=directory,
         camera=read_camera(directory / "camera.json"),
@@ -227,6 +233,7 @@ def _read_results(directory: Path) -> Results:
         objects=read_map(directory / "map.json"),
         boxes=read_boxes(boxes, times) if boxes.exists() else None,
         report=_read_json(report) if report.exists() else {},
+        tracks=read_tracks(tracks, times) if tracks.exists() else (),
     )
 
 

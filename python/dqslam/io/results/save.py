@@ -16,6 +16,7 @@ from dqslam.io.files import write_json, write_text
 from dqslam.io.results.boxes import write_boxes
 from dqslam.io.results.covariances import write_covariances
 from dqslam.io.results.graph_file import GRAPH_FILE, Problem, write_graph
+from dqslam.io.results.tracks import describe, write_tracks
 from dqslam.io.trajectory import write_trajectory
 from dqslam.recording import Detections
 
@@ -112,7 +113,11 @@ def write_estimate(
     write_json_camera(directory / "camera.json", estimate.camera)
     objects = [_object(estimate, row, marginals) for row in range(len(estimate.object_ids))]
     dropped = [{"id": number, "reason": reason} for number, reason in estimate.dropped.items()]
-    write_json(directory / "map.json", {"objects": objects, "dropped": dropped})
+    content: dict[str, Any] = {"objects": objects, "dropped": dropped}
+    if estimate.tracks:
+        content["tracks"] = [describe(track, estimate.timestamps) for track in estimate.tracks]
+        write_tracks(directory / "tracks.csv", estimate.tracks, estimate.timestamps)
+    write_json(directory / "map.json", content)
     if detections is not None:
         write_boxes(directory / "boxes.csv", estimate, detections, held_out)
     if marginals is not None:

@@ -1,0 +1,1 @@
+"""Tracks of what moves, measured on simulated streets, whose truth is known, and a real drive."""

@@ -1,0 +1,142 @@
+"""The estimate of one track: gradients, evidence and covariances against dense computations."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dqslam import Camera
+from dqslam.tracks.body import Views, predict_boxes
+from dqslam.tracks.fit import covariance, evidence_of_path, fit_track
+from dqslam.tracks.motion import HEADING, SPEED, VEHICLE
+from dqslam.tracks.problem import TrackProblem, Trajectory, linearize
+from dqslam.tracks.sizes import body_size
+
+CAMERA = Camera(700.0, 700.0, 620.0, 187.0, 1242, 375)
+AHEAD = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+COUNT = 8
+MOVES = np.ones(COUNT - 1, dtype=bool)
+
+
+def oncoming(noise_px=0.0, seed=0):
+    """A car that comes at 10 m/s along y = 3, seen by a camera at rest, 1.6 m above the ground."""
+    state = np.zeros((COUNT, 6))
+    state[:, 0], state[:, 1] = 40.0 - np.arange(COUNT), 3.0
+    state[:, HEADING], state[:, SPEED] = np.pi, 10.0
+    size = body_size("car")
+    views = Views(CAMERA, np.tile(AHEAD, (COUNT, 1, 1)), np.tile([0.0, 0.0, 1.6], (COUNT, 1)))
+    foot = np.column_stack([state[:, :2], np.zeros(COUNT)])
+    box = predict_boxes(views, foot, state[:, HEADING], np.exp(size.log_half)).box
+    box += noise_px * np.random.default_rng(seed).normal(size=box.shape)
+    problem = TrackProblem(
+        views,
+        0.1 * np.arange(COUNT),
+        box,
+        np.ones((COUNT, 4)),
+        np.zeros((COUNT, 4), dtype=bool),
+        np.zeros((COUNT, 3)),
+        np.full(COUNT, 0.1),
+        size,
+        VEHICLE,
+    )
+    return problem, Trajectory(state, size.log_half)
+
+
+def moved(at, change):
+    return Trajectory(at.state + change[:-3].reshape(-1, 6), at.log_half + change[-3:])
+
+
+def test_the_truth_is_the_estimate_of_boxes_without_noise():
+    problem, truth = oncoming()
+    random = np.random.default_rng(1)
+    start = moved(truth, 0.1 * random.normal(size=6 * COUNT + 3))
+    fit = fit_track(problem, start, MOVES)
+    assert fit.converged
+    # The prior of the speed, 0 with 12 m/s, makes it a little slower and nearer.
+    np.testing.assert_allclose(fit.trajectory.state[:, :2], truth.state[:, :2], atol=0.12)
+    np.testing.assert_allclose(fit.trajectory.state[:, SPEED], 10.0, atol=0.25)
+    np.testing.assert_allclose(fit.trajectory.log_half, truth.log_half, atol=0.01)
+
+
+def test_the_gradient_is_that_of_the_cost():
+    problem, truth = oncoming(noise_px=1.0)
+    random, e = np.random.default_rng(2), 1e-6
+    at = moved(truth, 0.05 * random.normal(size=6 * COUNT + 3))
+    first = truth.state[0]
+    equations = linearize(problem, at, MOVES, first)
+    found = np.append(equations.gradient.ravel(), equations.gradient_size)
+    for place in range(len(found)):
+        step = e * np.eye(len(found))[place]
+        costs = [linearize(problem, moved(at, s * step), MOVES, first).cost for s in (1, -1)]
+        assert found[place] == pytest.approx((costs[0] - costs[1]) / (2 * e), rel=1e-4, abs=1e-3)
+
+
+def dense(equations):
+    """The normal equations as one matrix."""
+    full = np.zeros((6 * COUNT + 3, 6 * COUNT + 3))
+    for row in range(COUNT):
+        own = slice(6 * row, 6 * row + 6)
+        full[own, own] = equations.diagonal[row]
+        full[own, -3:], full[-3:, own] = equations.border[row], equations.border[row].T
+        if row:
+            before = slice(6 * row - 6, 6 * row)
+            full[own, before] = equations.below[row - 1]
+            full[before, own] = equations.below[row - 1].T
+    full[-3:, -3:] = equations.corner
+    return full
+
+
+def test_covariance_and_evidence_are_those_of_the_dense_equations():
+    problem, truth = oncoming(noise_px=1.0)
+    fit = fit_track(problem, truth, MOVES)
+    full = dense(fit.equations)
+    spread, by_camera = covariance(fit)
+    np.testing.assert_allclose(spread @ full, np.eye(len(full)), atol=1e-6)
+    expected = fit.equations.log_density - fit.equations.cost
+    expected -= 0.5 * np.linalg.slogdet(full)[1]
+    assert fit.log_evidence == pytest.approx(expected)
+    # All cameras 1 m farther ahead see the same if the track is 1 m farther ahead, too.
+    ahead = np.tile([0.0, 0.0, 1.0, 0.0, 0.0, 0.0], COUNT)
+    change = (by_camera @ ahead)[:-3].reshape(-1, 6)
+    np.testing.assert_allclose(change[:, 0], 1.0, atol=0.02)
+    np.testing.assert_allclose(change[:, 1:], 0.0, atol=0.02)
+
+
+def test_a_path_that_is_exact_adds_no_evidence_and_one_that_errs_explains_a_creep():
+    """A car at rest whose camera is believed at rest, but was moved sideways by 2 cm an image."""
+    problem, truth = oncoming()
+    state = np.tile(truth.state[:1], (COUNT, 1))
+    state[:, SPEED] = 0.0
+    shifted = replace(
+        problem.views,
+        position=problem.views.position + 0.02 * np.arange(COUNT)[:, None] * [0, 1, 0],
+    )
+    foot = np.column_stack([state[:, :2], np.zeros(COUNT)])
+    box = predict_boxes(shifted, foot, state[:, HEADING], np.exp(truth.log_half)).box
+    fit = fit_track(replace(problem, box=box), Trajectory(state, truth.log_half), ~MOVES)
+    assert evidence_of_path(fit, np.zeros((6 * COUNT, 6 * COUNT))) == pytest.approx(0.0)
+    steps = np.tril(np.ones((COUNT, COUNT)))
+    walk = np.kron(steps @ steps.T, np.diag([0.02**2] * 3 + [1e-8] * 3))
+    assert evidence_of_path(fit, walk) > 0.5
+    exact = fit_track(problem, truth, MOVES)
+    assert evidence_of_path(exact, walk) < 0.0
+
+
+def test_a_start_behind_the_camera_has_no_estimate():
+    problem, truth = oncoming()
+    state = truth.state.copy()
+    state[:, 0] = -40.0
+    assert fit_track(problem, Trajectory(state, truth.log_half), MOVES) is None
+
+
+def test_edges_that_are_cut_bound_from_one_side():
+    """An edge cut 30 px inside of the outline costs nothing, one that ends 30 px outside does."""
+    problem, truth = oncoming()
+    costs = []
+    for shift in (0.0, 30.0, -30.0):  # of u_min
+        box, cut = problem.box.copy(), problem.truncated.copy()
+        box[0, 0], cut[0, 0] = box[0, 0] + shift, True
+        changed = replace(problem, box=box, truncated=cut)
+        costs.append(linearize(changed, truth, MOVES, truth.state[0]).cost)
+    assert costs[0] == pytest.approx(costs[1])
+    assert costs[2] > costs[0] + 10.0
