@@ -58,13 +58,18 @@ def estimate_between(
     cameras = _core.world_from_camera(model, recording.camera, path[detections.pose[rows]])
     error, variance = predict_errors(problem, found, noise, cameras, boxes.box, object_row[rows])
     table = graph.core.boxes
+    box = table.box - error
+    # Of an object that fits badly, an error may be larger than a small box: it is then unknown.
+    unknown = ~(box[:, :2] < box[:, 2:]).all(axis=1)
+    box[unknown] = table.box[unknown]
+    variance = variance + np.where(unknown[:, None], error**2, 0.0)
     covariance = (variance[:, :, None] * np.eye(4)).reshape(-1, 16)
     core = rebuilt(
         graph.core,
         boxes=_core.BoxTable(
             pose=table.pose,
             object=table.object,
-            box=table.box - error,
+            box=box,
             covariance=covariance,
             truncated=table.truncated,
         ),
