@@ -49,11 +49,23 @@ nitpick_ignore_regex = [
         "py:.*",
         r"(numpy|np|pathlib|collections|concurrent|typing|pydantic|typer|enum|matplotlib)\..*",
     ),
-    ("py:.*", r"(Any|ArrayLike|NDArray|ndarray|float64|int64|bool|Align|Ids|TypeAliasForwardRef)"),
-    ("py:.*", r"dict\[.*|dqslam\.studies\.paper\.methods\.Settings|dqslam\.io\.results\.save\..*"),
-    ("py:.*", r"dqslam\.(view\.scene|studies\.(sweep|batch)|plot)\..*"),
+    (
+        "py:.*",
+        r"(Any|ArrayLike|NDArray|ndarray|float32|float64|int64|uint8|bool|Align|Ids|TypeAliasForwardRef)",
+    ),
+    (
+        "py:.*",
+        r"dict\[.*|dqslam\.studies\.paper\.methods\.Settings|dqslam\.io\.results\.(save|graph_file)\..*",
+    ),
+    (
+        "py:.*",
+        r"dqslam\.(solids\.solids|view\.(scene|body|foxglove)|studies\.(sweep|batch)|plot)\..*",
+    ),
     ("py:.*", r"dqslam\.association\.scene_map\.SceneMap"),  # the inside of an association
-    ("py:.*", r"dqslam\.places\.(sensor\.Sensor|locate_upright\.Upright)"),  # that of a map
+    (
+        "py:.*",
+        r"dqslam\.places\.(sensor\.Sensor|locate_upright\.Upright|together\.Solved)",
+    ),  # that of a map
 ]
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"

@@ -41,7 +41,7 @@ def test_every_choice_of_the_core_is_public():
         for name, value in vars(_core).items()
         if isinstance(value, type) and issubclass(value, enum.Enum)
     ]
-    assert len(choices) == 11
+    assert len(choices) == 12
     for name in (*choices, "State"):
         assert getattr(dqslam, name) is getattr(_core, name)
 

@@ -30,7 +30,9 @@ def later(tmp_path_factory):
     rows = np.setdiff1d(np.arange(len(centers)), [1])
     earlier = replace(after.objects, centers=centers)
     columns = {
-        name: value[rows] if isinstance(value, np.ndarray) else tuple(value[row] for row in rows)
+        name: value[rows]
+        if isinstance(value, np.ndarray)
+        else tuple(value[row] for row in rows if value)
         for name, value in vars(earlier).items()
         if not isinstance(value, dict)
     }

@@ -37,9 +37,7 @@ def shape(
     ],
     depth_scale: Annotated[
         float,
-        typer.Option(
-            metavar="VALUE", help="Value of a pixel at one meter: 5000 of TUM, 1000 for mm."
-        ),
+        typer.Option(metavar="VALUE", help="Value of a pixel at 1 m: 5000 of TUM, 1000 for mm."),
     ],
     images: Annotated[
         Path | None,
@@ -63,7 +61,7 @@ def shape(
         float | None,
         typer.Option(
             metavar="METERS",
-            help="Side of a voxel. Default: from the size of each object, and the depth noise.",
+            help="Side of a voxel, meters. Default: from the size of each object and the depth noise.",
         ),
     ] = None,
     margin: Annotated[

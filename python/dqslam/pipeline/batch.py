@@ -174,7 +174,7 @@ def _step_covariance(recording: Recording, found: Association) -> NDArray[np.flo
     None where it was not estimated.
     """
     scene, count = found.scene, len(recording.timestamps)
-    if scene.step_noise is None:
+    if scene.step_noise is None or not len(scene.inflation):
         return None
     every = np.arange(count)
     steps = StepNoise.between(recording, every)
