@@ -61,7 +61,7 @@ def shape(
         float | None,
         typer.Option(
             metavar="METERS",
-            help="Side of a voxel, meters. Default: from the size of each object and the depth noise.",
+            help="Side of a voxel, meters. Default: from the object's size and the depth noise.",
         ),
     ] = None,
     margin: Annotated[
