@@ -60,9 +60,9 @@ def estimate_between(
     table = graph.core.boxes
     box = table.box - error
     # Of an object that fits badly, an error may be larger than a small box: it is then unknown.
-    unknown = ~(box[:, :2] < box[:, 2:]).all(axis=1)
+    unknown = np.flatnonzero((box[:, 2:] <= box[:, :2]).any(axis=1))
     box[unknown] = table.box[unknown]
-    variance = variance + np.where(unknown[:, None], error**2, 0.0)
+    variance[unknown] += error[unknown] ** 2
     covariance = (variance[:, :, None] * np.eye(4)).reshape(-1, 16)
     core = rebuilt(
         graph.core,
