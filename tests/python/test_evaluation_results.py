@@ -1,4 +1,5 @@
 import shutil
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -18,8 +19,9 @@ from dqslam.evaluation import (
 )
 from dqslam.io import Trajectory, load_recording, read_trajectory
 from dqslam.metrics import align_positions, center_errors
-from dqslam.pipeline import run
-from dqslam.simulation import perturb_odometry
+from dqslam.pipeline import RunOptions, run
+from dqslam.recording import Odometry
+from dqslam.simulation import load_scenario, perturb_odometry, simulate
 
 
 @pytest.fixture(scope="module")
@@ -271,3 +273,19 @@ def test_classes_as_ids_on_a_real_desk(tmp_path):
     # A box that shows nobody knows what is not judged.
     known = np.isin(truth.object_id, -1, invert=True)
     assert 0 < found["boxes"] <= known.sum() < len(truth.box)
+
+
+def test_poses_that_were_given_have_no_nees(tmp_path):
+    recording, truth = simulate(load_scenario("orbit"), seed=1)
+    steps = Odometry.from_poses(truth.poses, covariance=np.eye(6))
+    known = replace(recording, odometry=steps, positions=None)
+    result = run(known, RunOptions(mode=_core.Mode.MAPPING, trust_ids=1.0))
+    io.save_estimate(result.estimate, tmp_path / "out", marginals=result.marginals)
+    cameras = _core.world_from_camera(truth.pose_model, recording.camera, truth.poses)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = evaluate_results(
+            io.load_results(tmp_path / "out"), Trajectory(known.timestamps, cameras)
+        )
+    assert found["nees"] is None
+    assert found["ate"]["max"] == pytest.approx(0.0, abs=1e-7)

@@ -89,13 +89,15 @@ def pose_nees(
     the logarithm of the motion in SE(3) from an estimated pose to the true one. On the plane, and
     where else a covariance has no rank in a direction, the error in that direction does not count.
     None where the first pose has no true one, or no other pose has both a true one and a
-    covariance.
+    covariance, as where poses were given.
     """
     rows, true_rows = common_poses(results.timestamps, groundtruth, max_time_difference)
     if rows[0] != 0:
         return None
     known = np.isfinite(results.covariances[rows]).all(axis=(1, 2))
     known &= rows > 0
+    # Poses that were given, not estimated, have a covariance of zero.
+    known &= (np.diagonal(results.covariances[rows], axis1=1, axis2=2) > 0.0).any(axis=1)
     if not known.any():
         return None
     poses, true_poses = results.poses[rows], groundtruth.world_from_camera[true_rows]
