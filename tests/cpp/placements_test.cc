@@ -213,6 +213,7 @@ TEST(Placements, ThatNameNothingAreRefused) {
   refuse(
       Placement::kOn, -1, 0, 1, "placement_shared row 0: is neither -1 nor a row of shared_sigma");
   refuse(Placement::kBeside, 1, -1, 0, "placement_sigma row 0: must be positive");
+  refuse(Placement::kBeside, 1, -1, 1e-300, "placement_sigma row 0: must be at least 1e-9");
 }
 
 }  // namespace

@@ -225,6 +225,8 @@ void CheckPlacements(const Graph& graph) {
       FailAt("placement_other", row, needs_other ? "must be an object" : "must be -1");
     }
     if (table.sigma[row] <= 0) FailAt("placement_sigma", row, "must be positive");
+    // The squares of residuals must stay finite, or their switches would hide them.
+    if (table.sigma[row] < 1e-9) FailAt("placement_sigma", row, "must be at least 1e-9");
   }
 }
 

@@ -48,8 +48,8 @@ class _Rule(BaseModel):
     within_m: Annotated[float | None, Field(gt=0.0)] = None
     aligned_with: str | None = None
     upright: Literal[True] | None = None
-    sigma_m: Annotated[float | None, Field(gt=0.0)] = None
-    sigma_deg: Annotated[float | None, Field(gt=0.0)] = None
+    sigma_m: Annotated[float | None, Field(ge=1e-6)] = None
+    sigma_deg: Annotated[float | None, Field(ge=1e-6)] = None
 
     @model_validator(mode="after")
     def _is_one_rule(self) -> _Rule:
