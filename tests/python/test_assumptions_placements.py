@@ -60,7 +60,7 @@ def test_a_table_by_hand(tmp_path):
         ('on = "plane"', "", r":4: .*needs one of on, beside, aligned_with, upright, has none"),
         ("within_m = 0.6\n", "", r":12: .*within_m goes with beside"),
         ("sigma_deg = 9", "sigma_m = 9", r":18: .*the sigma of aligned_with is sigma_deg"),
-        ("sigma_m = 0.01", "sigma_m = 0", r":6: .*greater than or equal to 1e-06"),
+        ("sigma_m = 0.01", "sigma_m = 0", r":6: .*greater than or equal to 0.000001"),
         ("upright = true", "uprigth = true", r"uprigth; did you mean upright"),
         ("[0, -2, 0]", "[0, 0, 0]", r":2: .*up must be a direction"),
     ],
