@@ -11,6 +11,7 @@
 #include "dqslam/geometry/axes_jacobians.h"
 #include "dqslam/geometry/batch.h"
 #include "dqslam/geometry/ellipsoid.h"
+#include "dqslam/geometry/objects_in_camera.h"
 #include "dqslam/geometry/outline.h"
 
 namespace py = pybind11;
@@ -194,13 +195,32 @@ void BindEllipsoid(py::module_& m) {
 
 void BindProjection(py::module_& m) {
   m.def("project_to_boxes",
-        &ProjectToBoxesRows,
+        py::overload_cast<PoseModel, const Camera&, const RowMatrix&, const RowMatrix&>(
+            &ProjectToBoxesRows),
         "model"_a,
         "camera"_a,
         "poses"_a,
         "ellipsoids"_a,
         "Boxes (n, 4) of ellipsoid i from pose i [undistorted px], and whether it is strictly in "
         "front (n,); NaN where it is not.");
+  m.def(
+      "project_bodies_to_boxes",
+      [](PoseModel model,
+         const Camera& camera,
+         const RowMatrix& poses,
+         const std::vector<Shape>& shapes,
+         const RowMatrix& centers,
+         const RowMatrix& factors) {
+        return ProjectToBoxesRows(model, camera, poses, BodyTable{shapes, centers, factors});
+      },
+      "model"_a,
+      "camera"_a,
+      "poses"_a,
+      "shapes"_a,
+      "centers"_a,
+      "factors"_a,
+      "What project_to_boxes returns, of cuboids and cylinders: their centers (n, 3) [m] and "
+      "half-axes in the world, the columns of a matrix that is a row of the factors (n, 9) [m].");
   m.def("edges_out_of_sight",
         &EdgesOutOfSightRows,
         "model"_a,
@@ -244,7 +264,13 @@ void BindProjection(py::module_& m) {
       "first again; NaN where it is not strictly in front.");
   m.def(
       "box_chi_squares",
-      &BoxChiSquareRows,
+      py::overload_cast<PoseModel,
+                        const Camera&,
+                        const RowMatrix&,
+                        const RowMatrix&,
+                        const RowMatrix&,
+                        const RowMatrix&,
+                        const BoolTable&>(&BoxChiSquareRows),
       "model"_a,
       "camera"_a,
       "poses"_a,
@@ -256,6 +282,30 @@ void BindProjection(py::module_& m) {
       "edges that the image border cut (n, 4), for ellipsoid i from pose i. An edge that only "
       "bounds the object counts where the prediction ends inside. Infinite unless the object is "
       "strictly in front.");
+  m.def(
+      "body_chi_squares",
+      [](PoseModel model,
+         const Camera& camera,
+         const RowMatrix& poses,
+         const std::vector<Shape>& shapes,
+         const RowMatrix& centers,
+         const RowMatrix& factors,
+         const RowMatrix& boxes,
+         const RowMatrix& covariances,
+         const BoolTable& truncated) {
+        const BodyTable bodies{shapes, centers, factors};
+        return BoxChiSquareRows(model, camera, poses, bodies, boxes, covariances, truncated);
+      },
+      "model"_a,
+      "camera"_a,
+      "poses"_a,
+      "shapes"_a,
+      "centers"_a,
+      "factors"_a,
+      "boxes"_a,
+      "covariances"_a,
+      "truncated"_a,
+      "What box_chi_squares returns, of bodies as project_bodies_to_boxes has them.");
 }
 
 }  // namespace
@@ -264,6 +314,12 @@ void BindGeometry(py::module_& m) {
   py::native_enum<PoseModel>(m, "PoseModel", "enum.Enum", "How a pose is stored.")
       .value("SE2", PoseModel::kSe2)
       .value("SE3", PoseModel::kSe3)
+      .finalize();
+  py::native_enum<Shape>(m, "Shape", "enum.Enum", "The shape of an object.")
+      .value("ELLIPSOID", Shape::kEllipsoid)
+      .value("CUBOID", Shape::kCuboid)
+      .value("CYLINDER", Shape::kCylinder)
+      .value("AUTO", Shape::kAuto)
       .finalize();
   BindCamera(m);
   BindPoses(m);

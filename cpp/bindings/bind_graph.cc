@@ -103,15 +103,6 @@ void BindPlacements(py::module_& m) {
       .def_readonly("sigma", &PlacementTable::sigma, "Meters or radians, shape (p,).");
 }
 
-void BindShape(py::module_& m) {
-  py::native_enum<Shape>(m, "Shape", "enum.Enum", "The shape of an object.")
-      .value("ELLIPSOID", Shape::kEllipsoid)
-      .value("CUBOID", Shape::kCuboid)
-      .value("CYLINDER", Shape::kCylinder)
-      .value("AUTO", Shape::kAuto)
-      .finalize();
-}
-
 void BindScenePriors(py::module_& m) {
   py::class_<ScenePriors>(
       m, "ScenePriors", "What is known of the scene; each part is off while its sigma is 0.")
@@ -133,7 +124,6 @@ void BindScenePriors(py::module_& m) {
 
 void BindGraph(py::module_& m) {
   BindTables(m);
-  BindShape(m);
   BindScenePriors(m);
   BindPlacements(m);
   py::class_<Graph>(m, "Graph", "The problem as plain tables; ids are row numbers. Immutable.")

@@ -50,6 +50,7 @@ __all__: list[str] = [
     "adjoint",
     "axes_from_ellipsoid",
     "between",
+    "body_chi_squares",
     "box_chi_squares",
     "calibration_parameters",
     "compose",
@@ -70,6 +71,7 @@ __all__: list[str] = [
     "minus",
     "placement_misfits",
     "plus",
+    "project_bodies_to_boxes",
     "project_to_boxes",
     "project_to_outlines",
     "recalibrate",
@@ -87,6 +89,16 @@ class PoseModel(enum.Enum):
 
     SE2 = 0
     SE3 = 1
+
+class Shape(enum.Enum):
+    """
+    The shape of an object.
+    """
+
+    AUTO = 3
+    CUBOID = 1
+    CYLINDER = 2
+    ELLIPSOID = 0
 
 class Camera:
     """
@@ -315,16 +327,6 @@ class SizePriorTable:
         """
         The shared number that is added to each log_mean, or -1; shape (o,) or (0,).
         """
-
-class Shape(enum.Enum):
-    """
-    The shape of an object.
-    """
-
-    AUTO = 3
-    CUBOID = 1
-    CYLINDER = 2
-    ELLIPSOID = 0
 
 class ScenePriors:
     """
@@ -1347,6 +1349,21 @@ def between(
     Relative poses row by row: b_from_c, shape (n, d).
     """
 
+def body_chi_squares(
+    model: PoseModel,
+    camera: Camera,
+    poses: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    shapes: collections.abc.Sequence[Shape],
+    centers: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    factors: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    boxes: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    covariances: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    truncated: typing.Annotated[numpy.typing.ArrayLike, numpy.bool, "[m, n]"],
+) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+    """
+    What box_chi_squares returns, of bodies as project_bodies_to_boxes has them.
+    """
+
 def box_chi_squares(
     model: PoseModel,
     camera: Camera,
@@ -1509,6 +1526,21 @@ def plus(
 ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
     """
     Move poses (n, d) by tangents (n, k), in the frames of the poses.
+    """
+
+def project_bodies_to_boxes(
+    model: PoseModel,
+    camera: Camera,
+    poses: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    shapes: collections.abc.Sequence[Shape],
+    centers: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    factors: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+) -> tuple[
+    typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"],
+    typing.Annotated[numpy.typing.NDArray[numpy.bool], "[m, 1]"],
+]:
+    """
+    What project_to_boxes returns, of cuboids and cylinders: their centers (n, 3) [m] and half-axes in the world, the columns of a matrix that is a row of the factors (n, 9) [m].
     """
 
 def project_to_boxes(

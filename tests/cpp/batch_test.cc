@@ -7,6 +7,7 @@
 #include <string>
 
 #include "dqslam/geometry/ellipsoid.h"
+#include "dqslam/geometry/objects_in_camera.h"
 #include "scene.h"
 
 namespace dqslam {
@@ -177,6 +178,28 @@ void ExpectShapeError(const std::string& message, const std::function<void()>& c
 }
 
 // Files give quaternions to nine digits: over a long path the norms would drift apart.
+// The camera looks along y, from 4 m.  A cube's box is that of its front; a can's sides are the
+// tangents of its rim, and its lids' nearest points are as far as the cube's front.
+TEST(ProjectToBoxesRows, HasTheBoxesOfCuboidsAndCylinders) {
+  const RowMatrix poses = RowMatrix::Zero(3, 3);
+  RowMatrix centers(3, 3), factors(3, 9);
+  centers.rowwise() = Eigen::RowVector3d(0.1, 4.05, 0.4);
+  centers(2, 1) = 0.3;  // around the camera
+  for (int row = 0; row < 3; ++row) factors.row(row) << 0.5, 0, 0, 0, 0.5, 0, 0, 0, 0.5;
+  const BodyTable bodies{{Shape::kCuboid, Shape::kCylinder, Shape::kCuboid}, centers, factors};
+  const auto [boxes, in_front] = ProjectToBoxesRows(PoseModel::kSe2, SceneCamera(), poses, bodies);
+  const double front = 400 * 0.5 / 3.5, rim = 400 * 0.5 / std::sqrt(16 - 0.25);
+  const double half_width[] = {front, rim};
+  for (const int row : {0, 1}) {
+    EXPECT_TRUE(in_front[row]);
+    const double u = half_width[row];
+    const Eigen::RowVector4d expected(319.5 - u, 239.5 - front, 319.5 + u, 239.5 + front);
+    EXPECT_LT((boxes.row(row) - expected).cwiseAbs().maxCoeff(), 0.002 * front) << row;
+  }
+  EXPECT_FALSE(in_front[2]);
+  EXPECT_TRUE(boxes.row(2).array().isNaN().all());
+}
+
 TEST(DeadReckonRows, KeepsQuaternionsUnit) {
   RowMatrix relative(5000, 7);
   Eigen::Matrix<double, 1, 7> step;
@@ -212,7 +235,13 @@ TEST(RowShapes, NameTheTableOfTheWrongShape) {
   ExpectShapeError("ellipsoids has shape (2, 3), expected (2, 9)",
                    [&] { DifferentiateBoxesRows(se2, camera, two, two); });
   ExpectShapeError("poses has shape (2, 7), expected (2, 3)",
-                   [&] { ProjectToOutlinesRows(se2, camera, wide, wide, 9); });
+                   [&] { ProjectToOutlinesRows(se2, camera, wide, RowMatrix::Zero(2, 9), 9); });
+  BodyTable bodies{{Shape::kCuboid, Shape::kCylinder}, two, RowMatrix::Zero(2, 9)};
+  ExpectShapeError("centers has shape (2, 3), expected (3, 3)",
+                   [&] { ProjectToBoxesRows(se2, camera, three, bodies); });
+  bodies.shapes[1] = Shape::kEllipsoid;
+  ExpectShapeError("shapes: expected a cuboid or a cylinder for each of 2 poses",
+                   [&] { ProjectToBoxesRows(se2, camera, two, bodies); });
   ExpectShapeError("points: an outline needs at least 2",
                    [&] { ProjectToOutlinesRows(se2, camera, two, two, 1); });
   ExpectShapeError("a_from_b has shape (2, 3), expected (2, 7)", [&] { AdjointRows(se3, two); });

@@ -3,8 +3,6 @@
 #include <limits>
 
 #include "dqslam/costs/whitening.h"
-#include "dqslam/geometry/batch.h"
-#include "dqslam/geometry/dispatch.h"
 #include "dqslam/geometry/outline.h"
 
 namespace dqslam {
@@ -22,6 +20,29 @@ double ChiSquare(const Object& in_camera,
   Eigen::Vector4d error = predicted - observed;
   IgnoreBeyond(OneSidedEdges(truncated, camera, in_camera, predicted), &error);
   return (sqrt_information * error).squaredNorm();
+}
+
+template <typename Objects>
+Eigen::VectorXd ChiSquares(PoseModel model,
+                           const Camera& camera,
+                           const RowMatrix& poses,
+                           const Objects& objects,
+                           const RowMatrix& boxes,
+                           const RowMatrix& covariances,
+                           const BoolTable& truncated) {
+  const Eigen::Index rows = poses.rows();
+  RequireShape("boxes", boxes, rows, kBoxSize);
+  RequireShape("covariances", covariances, rows, kBoxSize * kBoxSize);
+  RequireShape("truncated", truncated, rows, kBoxSize);
+  Eigen::VectorXd chi_squares(rows);
+  ForEachInCamera(model, camera, poses, objects, [&](Eigen::Index i, const auto& in_camera) {
+    chi_squares[i] = ChiSquare(in_camera,
+                               camera,
+                               Eigen::Vector4d(boxes.row(i)),
+                               EdgeFlags(truncated.row(i)),
+                               SqrtInformationOfRow<kBoxSize>("covariances", covariances, i));
+  });
+  return chi_squares;
 }
 
 }  // namespace
@@ -49,27 +70,17 @@ Eigen::VectorXd BoxChiSquareRows(PoseModel model,
                                  const RowMatrix& boxes,
                                  const RowMatrix& covariances,
                                  const BoolTable& truncated) {
-  const Eigen::Index rows = poses.rows();
-  RequireShape("ellipsoids", ellipsoids, rows, kLandmarkSize);
-  RequireShape("boxes", boxes, rows, kBoxSize);
-  RequireShape("covariances", covariances, rows, kBoxSize * kBoxSize);
-  RequireShape("truncated", truncated, rows, kBoxSize);
-  return Dispatch(model, [&](auto pose) {
-    using Pose = decltype(pose);
-    RequireShape("poses", poses, rows, Pose::kSize);
-    const Mount mount(camera);
-    Eigen::VectorXd chi_squares(rows);
-    for (Eigen::Index i = 0; i < rows; ++i) {
-      const Surface<double> in_camera = ToCamera(LocateCamera<Pose>(poses.row(i).data(), mount),
-                                                 EllipsoidModel::Unpack(ellipsoids.row(i).data()));
-      chi_squares[i] = BoxChiSquare(in_camera,
-                                    camera,
-                                    boxes.row(i),
-                                    truncated.row(i),
-                                    SqrtInformationOfRow<kBoxSize>("covariances", covariances, i));
-    }
-    return chi_squares;
-  });
+  return ChiSquares(model, camera, poses, ellipsoids, boxes, covariances, truncated);
+}
+
+Eigen::VectorXd BoxChiSquareRows(PoseModel model,
+                                 const Camera& camera,
+                                 const RowMatrix& poses,
+                                 const BodyTable& bodies,
+                                 const RowMatrix& boxes,
+                                 const RowMatrix& covariances,
+                                 const BoolTable& truncated) {
+  return ChiSquares(model, camera, poses, bodies, boxes, covariances, truncated);
 }
 
 }  // namespace dqslam

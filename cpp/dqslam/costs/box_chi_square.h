@@ -2,10 +2,7 @@
 // and the misfits of a report all come from this number.
 #pragma once
 
-#include "dqslam/geometry/blocks.h"
-#include "dqslam/geometry/body.h"
-#include "dqslam/geometry/camera.h"
-#include "dqslam/geometry/ellipsoid.h"
+#include "dqslam/geometry/objects_in_camera.h"
 
 namespace dqslam {
 
@@ -22,13 +19,20 @@ double BoxChiSquare(const Body<double>& in_camera,
                     const EdgeFlags& truncated,
                     const Eigen::Matrix4d& sqrt_information);
 
-/// Chi-square of box i for ellipsoid i from pose i, shape (n).  Boxes (n, 4) [undistorted px] with
+/// Chi-square of box i for object i from pose i, shape (n).  Boxes (n, 4) [undistorted px] with
 /// their covariances (n, 16) [px^2] and the edges that the image border cut (n, 4).
 /// Throws std::invalid_argument naming the table, and the row of a covariance that is none.
 Eigen::VectorXd BoxChiSquareRows(PoseModel model,
                                  const Camera& camera,
                                  const RowMatrix& poses,
                                  const RowMatrix& ellipsoids,
+                                 const RowMatrix& boxes,
+                                 const RowMatrix& covariances,
+                                 const BoolTable& truncated);
+Eigen::VectorXd BoxChiSquareRows(PoseModel model,
+                                 const Camera& camera,
+                                 const RowMatrix& poses,
+                                 const BodyTable& bodies,
                                  const RowMatrix& boxes,
                                  const RowMatrix& covariances,
                                  const BoolTable& truncated);

@@ -1,9 +1,10 @@
 #include "dqslam/geometry/batch.h"
 
+#include <algorithm>
 #include <limits>
 
 #include "dqslam/geometry/box_derivatives.h"
-#include "dqslam/geometry/dispatch.h"
+#include "dqslam/geometry/objects_in_camera.h"
 #include "dqslam/geometry/outline.h"
 
 namespace dqslam {
@@ -21,27 +22,39 @@ RowMatrix ShapeRows(const char* name, const RowMatrix& landmarks) {
   return shapes;
 }
 
-// Calls visit(i, surface) with each ellipsoid as its pose's camera has it.
-template <typename Visit>
-void ForEachInCamera(PoseModel model,
-                     const Camera& camera,
-                     const RowMatrix& poses,
-                     const RowMatrix& ellipsoids,
-                     const Visit& visit) {
-  Dispatch(model, [&](auto pose) {
-    using Pose = decltype(pose);
-    RequireShape("poses", poses, poses.rows(), Pose::kSize);
-    RequireShape("ellipsoids", ellipsoids, poses.rows(), kLandmarkSize);
-    const Mount mount(camera);
-    for (Eigen::Index i = 0; i < poses.rows(); ++i) {
-      visit(i,
-            ToCamera(LocateCamera<Pose>(poses.row(i).data(), mount),
-                     EllipsoidModel::Unpack(ellipsoids.row(i).data())));
-    }
+template <typename Objects>
+std::pair<RowMatrix, Mask> ProjectToBoxes(PoseModel model,
+                                          const Camera& camera,
+                                          const RowMatrix& poses,
+                                          const Objects& objects) {
+  RowMatrix boxes = RowMatrix::Constant(poses.rows(), kBoxSize, kNan);
+  Mask in_front(poses.rows());
+  ForEachInCamera(model, camera, poses, objects, [&](Eigen::Index i, const auto& object) {
+    Eigen::Vector4d box;
+    in_front[i] = ProjectToBox(object, camera, &box);
+    if (in_front[i]) boxes.row(i) = box;
   });
+  return {boxes, in_front};
 }
 
 }  // namespace
+
+void BodyTable::Check(Eigen::Index rows) const {
+  RequireShape("centers", centers, rows, 3);
+  RequireShape("factors", factors, rows, 9);
+  if (static_cast<Eigen::Index>(shapes.size()) != rows ||
+      std::count(shapes.begin(), shapes.end(), Shape::kEllipsoid) > 0) {
+    throw std::invalid_argument("shapes: expected a cuboid or a cylinder for each of " +
+                                std::to_string(rows) + " poses");
+  }
+}
+
+Body<double> BodyTable::Row(Eigen::Index i) const {
+  return {shapes[i],
+          RoundedModel(shapes[i]).rounding,
+          centers.row(i),
+          Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(factors.row(i).data())};
+}
 
 RowMatrix ComposeRows(PoseModel model, const RowMatrix& a, const RowMatrix& b) {
   return Dispatch(model, [&](auto pose) {
@@ -137,32 +150,26 @@ RowMatrix DeadReckonRows(PoseModel model, const Eigen::VectorXd& first, const Ro
 }
 
 RowMatrix WorldFromCameraRows(PoseModel model, const Camera& camera, const RowMatrix& poses) {
-  return Dispatch(model, [&](auto pose) {
-    using Pose = decltype(pose);
-    RequireShape("poses", poses, poses.rows(), Pose::kSize);
-    RowMatrix result(poses.rows(), Se3::kSize);
-    const Mount mount(camera);
-    for (Eigen::Index i = 0; i < poses.rows(); ++i) {
-      const CameraInWorld<double> located = LocateCamera<Pose>(poses.row(i).data(), mount);
-      const Eigen::Quaterniond rotation(Eigen::Matrix3d(located.camera_from_world.transpose()));
-      result.row(i) << located.position.transpose(), rotation.normalized().coeffs().transpose();
-    }
-    return result;
+  RowMatrix result(poses.rows(), Se3::kSize);
+  ForEachCamera(model, camera, poses, [&](Eigen::Index i, const CameraInWorld<double>& located) {
+    const Eigen::Quaterniond rotation(Eigen::Matrix3d(located.camera_from_world.transpose()));
+    result.row(i) << located.position.transpose(), rotation.normalized().coeffs().transpose();
   });
+  return result;
 }
 
 std::pair<RowMatrix, Mask> ProjectToBoxesRows(PoseModel model,
                                               const Camera& camera,
                                               const RowMatrix& poses,
                                               const RowMatrix& ellipsoids) {
-  RowMatrix boxes = RowMatrix::Constant(poses.rows(), kBoxSize, kNan);
-  Mask in_front(poses.rows());
-  ForEachInCamera(model, camera, poses, ellipsoids, [&](Eigen::Index i, const auto& surface) {
-    Eigen::Vector4d box;
-    in_front[i] = ProjectToBox(surface, camera, &box);
-    if (in_front[i]) boxes.row(i) = box;
-  });
-  return {boxes, in_front};
+  return ProjectToBoxes(model, camera, poses, ellipsoids);
+}
+
+std::pair<RowMatrix, Mask> ProjectToBoxesRows(PoseModel model,
+                                              const Camera& camera,
+                                              const RowMatrix& poses,
+                                              const BodyTable& bodies) {
+  return ProjectToBoxes(model, camera, poses, bodies);
 }
 
 BoolTable EdgesOutOfSightRows(PoseModel model,
