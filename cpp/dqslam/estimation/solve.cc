@@ -120,7 +120,8 @@ class Solver {
       summary.start_seconds = elapsed.count();
     }
     Stage last = BatchStage(context_);
-    if (ThrowsBoxesOut(options_.loss) || (!start && Refines() && Grows())) {
+    const bool nearly_all_fit = Graduates() && Refines() && NearlyAllFit(context_, *state);
+    if (!nearly_all_fit && (ThrowsBoxesOut(options_.loss) || (!start && Refines() && Grows()))) {
       Stage robust = last;
       robust.loss = Loss::kCauchy;
       if (!ThrowsBoxesOut(options_.loss)) robust.function_tolerance = options_.grow_tolerance;
@@ -130,7 +131,9 @@ class Solver {
         TryOtherStarts(context_, robust, true, state, &summary);
       }
     }
-    if (Graduates()) {
+    if (nearly_all_fit) {
+      last = StageWithoutFarBoxes(context_, *state);
+    } else if (Graduates()) {
       Append(GraduateNonConvexity(context_, state), &summary);
       last = InlierStage(context_, *state);
     }
