@@ -12,8 +12,7 @@ constexpr double kGraduation = 1.6;  // the factor of the control parameter in e
 constexpr double kFar = 10;          // chi-square, in units of the threshold
 constexpr int kMaxRounds = 60;
 constexpr int kRoundIterations = 15;
-// Shares of all boxes, and of those of an object, that may not fit where nearly all fit.
-constexpr double kFewMisfits = 0.01, kFewMisfitsOfObject = 0.25;
+constexpr double kFewMisfits = 0.01;  // the largest share of the boxes where nearly all fit
 
 // Weight of a box with chi-square s at threshold c2, for control parameter mu (Yang 2020, eqs. 12
 // and 14).  For Geman-McClure mu decreases to 1, for truncated least squares it increases.
@@ -23,21 +22,6 @@ double Weight(Loss loss, double s, double c2, double mu) {
   if (s <= mu / (mu + 1) * c2) return 1;
   if (s >= (mu + 1) / mu * c2) return 0;
   return std::sqrt(c2 * mu * (mu + 1) / s) - mu;
-}
-
-std::vector<bool> BoxesWithin(const SolveContext& context, const State& state, double chi_square) {
-  std::vector<bool> within;
-  for (const double cost : BoxCosts(context, state)) within.push_back(2 * cost <= chi_square);
-  return within;
-}
-
-Stage StageOfBoxes(const SolveContext& context, const State& state, double chi_square) {
-  Stage stage = BatchStage(context);
-  stage.loss = Loss::kNone;
-  for (const bool is_within : BoxesWithin(context, state, chi_square)) {
-    stage.weights.push_back(is_within);
-  }
-  return stage;
 }
 
 }  // namespace
@@ -84,26 +68,30 @@ Summary GraduateNonConvexity(const SolveContext& context, State* state) {
 }
 
 bool NearlyAllFit(const SolveContext& context, const State& state) {
-  const std::vector<bool> inliers = InlierBoxes(context, state);
-  const auto misfits = std::count(inliers.begin(), inliers.end(), false);
-  if (misfits > kFewMisfits * inliers.size()) return false;
+  const Eigen::ArrayXd chi_squares = 2 * BoxCosts(context, state);
+  const Mask misfits = !(chi_squares <= context.options.outlier_chi_square);
+  if (misfits.count() > kFewMisfits * misfits.size()) return false;
+  if ((!(chi_squares <= kFar * context.options.outlier_chi_square)).any()) return false;
   const auto& objects = context.prepared.boxes_of_object;
-  return std::all_of(objects.begin(), objects.end(), [&](const std::vector<int>& rows) {
-    const auto fit = std::count_if(rows.begin(), rows.end(), [&](int row) { return inliers[row]; });
-    return rows.size() - fit <= kFewMisfitsOfObject * rows.size();
+  return std::none_of(objects.begin(), objects.end(), [&](const std::vector<int>& rows) {
+    const auto count =
+        std::count_if(rows.begin(), rows.end(), [&](int row) { return misfits[row]; });
+    return IsMixed(count, static_cast<std::ptrdiff_t>(rows.size()));
   });
 }
 
 Stage InlierStage(const SolveContext& context, const State& state) {
-  return StageOfBoxes(context, state, context.options.outlier_chi_square);
-}
-
-Stage StageWithoutFarBoxes(const SolveContext& context, const State& state) {
-  return StageOfBoxes(context, state, kFar * context.options.outlier_chi_square);
+  Stage stage = BatchStage(context);
+  stage.loss = Loss::kNone;
+  for (const bool is_inlier : InlierBoxes(context, state)) stage.weights.push_back(is_inlier);
+  return stage;
 }
 
 std::vector<bool> InlierBoxes(const SolveContext& context, const State& state) {
-  return BoxesWithin(context, state, context.options.outlier_chi_square);
+  const Eigen::VectorXd costs = BoxCosts(context, state);
+  std::vector<bool> inliers;
+  for (const double cost : costs) inliers.push_back(2 * cost <= context.options.outlier_chi_square);
+  return inliers;
 }
 
 }  // namespace dqslam

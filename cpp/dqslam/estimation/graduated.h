@@ -17,16 +17,13 @@ bool ThrowsBoxesOut(Loss loss);
 /// clear which boxes fit.
 Summary GraduateNonConvexity(const SolveContext& context, State* state);
 
-/// Whether so few boxes of each object do not fit at the state that there is nothing to graduate: a
-/// fit of all boxes but the far ones tells which of them fit.
+/// Whether so few boxes do not fit at the state, none of them far from it and no object mixed, that
+/// there is nothing to graduate: a fit of all boxes tells which of them fit.
 bool NearlyAllFit(const SolveContext& context, const State& state);
 
 /// The last stage of all variables, with weight 1 for the boxes that fit at the state and weight 0
 /// for the others.
 Stage InlierStage(const SolveContext& context, const State& state);
-
-/// The same, but only boxes that are far from fitting have weight 0.
-Stage StageWithoutFarBoxes(const SolveContext& context, const State& state);
 
 /// Boxes whose chi-square at the state is at most options.outlier_chi_square.
 std::vector<bool> InlierBoxes(const SolveContext& context, const State& state);

@@ -19,8 +19,7 @@ constexpr double kImpossibleSize = 21.1;  // chi-square of 3 degrees of freedom,
 constexpr double kTorn = 5;               // chi-square of odometry, per degree of freedom
 constexpr int kMaxRestarts = 2;
 constexpr int kFewBoxes = 3;
-// Where this share of an object's boxes do not fit, they may be of several objects.  The object is
-// then started from some successive boxes at different parts of the path.
+// A mixed object is started from some successive boxes at different parts of the path.
 constexpr double kMixed = 0.25;
 constexpr int kSomeBoxes = 4;
 constexpr int kParts = 6;
@@ -82,7 +81,7 @@ std::vector<Vector9d> OtherStarts(const SolveContext& context,
   const int count = static_cast<int>(boxes.size());
   const auto misfits = std::count_if(
       boxes.begin(), boxes.end(), [&](int row) { return !(2 * costs[row] <= kImpossibleBox); });
-  const bool is_mixed = from_parts && count > kSomeBoxes && misfits > kMixed * count;
+  const bool is_mixed = from_parts && IsMixed(misfits, count);
   std::vector<Vector9d> starts;
   if (count <= kFewBoxes || is_mixed || HasImpossibleSize(context, state, object)) {
     starts.push_back(StartObject(by_size, state, object, boxes));
@@ -100,6 +99,10 @@ std::vector<Vector9d> OtherStarts(const SolveContext& context,
 }
 
 }  // namespace
+
+bool IsMixed(std::ptrdiff_t misfits, std::ptrdiff_t boxes) {
+  return boxes > kSomeBoxes && misfits > kMixed * boxes;
+}
 
 Stage StageOfObject(const Stage& all, const std::vector<int>& boxes, const Graph& graph) {
   Stage stage = all;

@@ -1,9 +1,14 @@
 // Repair of a solution: objects that are stuck in a wrong minimum are found and started again.
 #pragma once
 
+#include <cstddef>
+
 #include "dqslam/solver/stage.h"
 
 namespace dqslam {
+
+/// Whether so many of an object's boxes do not fit that they may be of several objects.
+bool IsMixed(std::ptrdiff_t misfits, std::ptrdiff_t boxes);
 
 /// The last stage: it has all poses, all boxes and the last residual of the options.
 Stage BatchStage(const SolveContext& context);

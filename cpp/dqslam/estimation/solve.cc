@@ -132,7 +132,8 @@ class Solver {
       }
     }
     if (nearly_all_fit) {
-      last = StageWithoutFarBoxes(context_, *state);
+      last.loss = Loss::kNone;
+      last.weights.assign(last.boxes.size(), 1);
     } else if (Graduates()) {
       Append(GraduateNonConvexity(context_, state), &summary);
       last = InlierStage(context_, *state);
