@@ -21,6 +21,7 @@ from depth_scenes import (
     ring,
 )
 from dqslam.recording.interpolation import interpolate_poses
+from dqslam.surface.body import bodies_of
 
 VOXEL = 0.012
 COARSE = dq.SurfaceOptions(voxel=VOXEL)
@@ -199,3 +200,22 @@ def test_vertices_have_the_colors_of_the_side_that_images_show():
     assert green.max() < 80
     assert (red > 150)[x[sure] > 0].mean() > 0.99
     assert (blue > 150)[x[sure] < 0].mean() > 0.99
+
+
+@pytest.mark.parametrize("shape", [dq.Shape.CUBOID, dq.Shape.CYLINDER])
+def test_voxels_reach_as_far_as_a_box_or_a_can(shape):
+    """The ellipsoid that stands for it has the axes of the body in another order, and is larger."""
+    half, turn = np.array([0.1, 0.1, 0.3]), Rotation.from_rotvec([0.2, -0.4, 0.9])
+    shares = 5 / 3 if shape == dq.Shape.CUBOID else np.array([5 / 4, 5 / 4, 5 / 3])
+    order = Rotation.from_matrix([[0, 1, 0], [0, 0, 1], [1, 0, 0]])  # z of the body becomes x
+    semi_axes = (np.sqrt(shares) * half)[[2, 0, 1]]
+    results = results_of(all_round()[:1], [at(0, 0, 0, half=half)])
+    mapped = replace(
+        results.objects,
+        semi_axes=semi_axes[None],
+        orientations=(turn * order).as_quat()[None],
+        object_shapes=(shape,),
+        half_lengths=half[None],
+        rotation_vectors=turn.as_rotvec()[None],
+    )
+    np.testing.assert_allclose(bodies_of(mapped)[0].reach, [0.3, 0.1, 0.1], atol=1e-12)

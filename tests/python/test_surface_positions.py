@@ -58,7 +58,15 @@ def test_centers_are_those_of_the_truth(surfaces):
     np.testing.assert_allclose(found.object_in_robot, np.tile([0, 0, away], (16, 1)), atol=0.005)
     off = found.object_in_robot - [0.0, 0.0, away]
     nees = np.einsum("pi,pij,pj->p", off, np.linalg.inv(found.covariance), off)
-    assert 0.05 < nees.mean() < 3.0
+    # As if each were worth an eighth of itself, so that all sixteen are worth two.
+    assert 0.05 < 8.0 * nees.mean() < 3.0
+
+
+def test_all_positions_of_an_object_are_worth_two(surfaces):
+    images = cast(PATH, [BODY, Floor()], sigma=0.002, seed=1)
+    two, all_of_them = measured(PATH[:2], images[:2], surfaces), measured(PATH, images, surfaces)
+    np.testing.assert_array_equal(two.object_in_robot, all_of_them.object_in_robot[:2])
+    np.testing.assert_allclose(8.0 * two.covariance, all_of_them.covariance[:2])
 
 
 def test_a_camera_that_was_elsewhere_measures_where_it_was(surfaces):
@@ -122,8 +130,9 @@ def test_positions_make_path_and_centers_better():
     before, after = [], []
     for seed in (5, 6, 7):
         recording = recorded(path, bodies, np.random.default_rng(seed))
-        estimate, _ = dq.solve(dq.build_graph(recording))
-        before.append(errors_of(estimate, path, bodies))
+        graph = dq.build_graph(recording, shapes=dq.Shape.CUBOID)
+        estimate, _ = dq.solve(graph)
+        before.append(errors_of(graph, estimate, path, bodies))
         for _ in range(2):
             boxes = recording.detections
             results = results_of(estimate.poses, [])
@@ -133,11 +142,14 @@ def test_positions_make_path_and_centers_better():
             positions = dq.surface.relative_positions(results, depth, found)
             assert len(positions) >= 28
             with_depth = replace(recording, positions=positions)
-            estimate, _ = dq.solve(dq.build_graph(with_depth))
-        after.append(errors_of(estimate, path, bodies))
-    paths, centers = np.mean(after, axis=0) / np.mean(before, axis=0)
-    assert paths < 0.9
+            graph = dq.build_graph(with_depth, shapes=dq.Shape.CUBOID)
+            estimate, _ = dq.solve(graph)
+        after.append(errors_of(graph, estimate, path, bodies))
+    paths, centers, _ = np.mean(after, axis=0) / np.mean(before, axis=0)
+    assert paths < 0.95
     assert centers < 0.75
+    # Three coordinates: 3 is right. If positions were independent, it would be 9.
+    assert np.mean(after, axis=0)[2] < 4.5
 
 
 def recorded(path, bodies, rng):
@@ -187,8 +199,10 @@ def mapped(estimate):
     )
 
 
-def errors_of(estimate, path, bodies):
-    """Return mean errors of positions and of centers, in the frame of the first pose."""
-    centers = np.array([body.center for body in bodies])
+def errors_of(graph, estimate, path, bodies):
+    """Return mean errors of positions and of centers, meters, and the NEES of centers."""
+    off = estimate.centers - [body.center for body in bodies]
     paths = np.linalg.norm(estimate.poses[:, :3] - path[:, :3], axis=1).mean()
-    return paths, np.linalg.norm(estimate.centers - centers, axis=1).mean()
+    covariance = dq.marginal_covariances(graph, estimate).objects[:, :3, :3]
+    nees = np.einsum("oi,oij,oj->o", off, np.linalg.inv(covariance), off)
+    return paths, np.linalg.norm(off, axis=1).mean(), nees.mean()

@@ -10,7 +10,7 @@ from dqslam.surface.views import View, Views, known_times
 from dqslam.surface.volume import Volume
 
 CAMERA = dq.Camera(100.0, 100.0, 49.5, 39.5, 100, 80)
-BODY = Body(center=np.array([0.0, 0.0, 1.0]), world_from_object=np.eye(3), semi_axes=np.ones(3))
+BODY = Body(np.array([0.0, 0.0, 1.0]), np.eye(3), semi_axes=np.ones(3), reach=np.ones(3))
 
 
 def volume():
@@ -80,7 +80,7 @@ def test_pixels_without_depth_say_nothing():
 
 def test_a_volume_beside_the_image_or_behind_the_camera_sees_nothing():
     for center in ([5.0, 0.0, 1.0], [0.0, 0.0, -1.0]):
-        body = Body(np.array(center), np.eye(3), np.ones(3))
+        body = Body(np.array(center), np.eye(3), np.ones(3), np.ones(3))
         made = Volume(body, 0.01, 0.04, np.full(3, 0.05), noise=0.002)
         made.make()
         made.integrate(flat(1.0))

@@ -98,6 +98,7 @@ def view(
     from dqslam.view.changes import with_changes
     from dqslam.view.page import WRITTEN_BY, write_page_files
     from dqslam.view.photographs import write_photographs
+    from dqslam.view.surfaces import has_surfaces, with_surfaces
 
     output = Output(quiet=quiet, as_json=json)
     if images is not None and export is None:
@@ -116,6 +117,8 @@ def view(
         scene = build_scene(results, groundtruth=truth, objects=true_objects, align=align)
         if changes is not None:
             scene = with_changes(scene, changes)
+        if has_surfaces(directory):
+            scene = with_surfaces(scene, directory)
         times = given_frame_times(frame_times, frame_rate)
         found = None if images is None else io.find_images(images, results.timestamps, times)
     written: dict[str, str] = {}

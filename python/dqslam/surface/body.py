@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dqslam._checks import Floats
+from dqslam._core import Shape
 from dqslam.io import MapObjects
 
 
@@ -20,6 +21,8 @@ class Body:
     """Rotation matrix (3, 3); columns are the axes of the object."""
     semi_axes: Floats
     """Meters, shape (3,)."""
+    reach: Floats
+    """How far the ellipsoid, box or can itself reaches along the axes, meters, shape (3,)."""
 
     @property
     def size(self) -> float:
@@ -44,14 +47,21 @@ class Body:
 
 
 def bodies_of(objects: MapObjects) -> dict[int, Body]:
-    """Return the bodies of the objects of a map that are ellipsoids, by their row."""
+    """Return the bodies of the ellipsoids, boxes and cans of a map, by their rows."""
     from scipy.spatial.transform import Rotation
 
-    return {
-        int(row): Body(
-            center=objects.centers[row],
-            world_from_object=Rotation.from_quat(objects.orientations[row]).as_matrix(),
-            semi_axes=objects.semi_axes[row],
-        )
-        for row in np.flatnonzero(objects.is_ellipsoid)
-    }
+    solids, found = objects.solids, {}
+    for row in np.flatnonzero(objects.is_ellipsoid).tolist():
+        turn = Rotation.from_quat(objects.orientations[row]).as_matrix()
+        reach = objects.semi_axes[row]
+        if solids.is_body[row]:
+            reach = _reach(turn.T @ solids.factors[row], solids.shapes[row])
+        found[row] = Body(objects.centers[row], turn, objects.semi_axes[row], reach)
+    return found
+
+
+def _reach(factor: Floats, shape: Shape) -> Floats:
+    """Return how far a box or a can with half-axes (3, 3), in columns, reaches along x, y and z."""
+    if shape == Shape.CYLINDER:  # its third half-axis is that of the can
+        return np.asarray(np.hypot(factor[:, 0], factor[:, 1]) + np.abs(factor[:, 2]))
+    return np.asarray(np.abs(factor).sum(axis=1))

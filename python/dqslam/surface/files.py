@@ -118,7 +118,7 @@ def _read_mesh(path: Path, object_id: int) -> Mesh:
         raise FileError(path, "no such file")
     try:
         mesh = cast(Any, trimesh.load(path, process=False, force="mesh"))
-        vertices = as_floats("vertices", mesh.vertices, [None, 3])
+        vertices = np.array(as_floats("vertices", mesh.vertices, [None, 3]))  # which may be changed
         faces = np.asarray(mesh.faces, dtype=np.int64).reshape(-1, 3)
     except Exception as error:  # whatever trimesh raises on a wrong file
         raise FileError(path, f"cannot be read as a mesh: {error}") from None

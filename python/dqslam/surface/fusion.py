@@ -127,7 +127,7 @@ def _volume(name: str, body: Body, views: Views, how: SurfaceOptions) -> Volume 
         return None
     distance = float(np.median(distances))
     sigma = how.depth_noise * distance**2
-    reach = (1.0 + how.margin) * body.semi_axes
+    reach = (1.0 + how.margin) * body.reach
     pixel = distance / min(views.camera.fx, views.camera.fy)
     voxel = how.voxel or max(2.0 * float(reach.max()) / _VOXELS_ALONG, sigma, pixel)
     truncation = max(_TRUNCATION_VOXELS * voxel, _TRUNCATION_SIGMAS * sigma)

@@ -1,10 +1,10 @@
 """A scene as MCAP with the schemas of Foxglove, as a file or live over a websocket.
 
-Topics: ``/map`` has an ellipsoid, a cuboid or a cylinder for each object, ``/truth`` a cuboid for
-each true object of known size, ``/paths`` the paths. For each pose, at its time, ``/tf`` has camera
-in world, ``/pose`` the same as a pose, ``/boxes`` the boxes of the image and ``/outlines`` the
-outlines of the objects in it, in undistorted pixels. ``/calibration`` is the pinhole of these
-pixels.
+Topics: ``/map`` has the surface of each object or its ellipsoid, cuboid or cylinder, ``/truth`` a
+cuboid for each true object of known size, ``/paths`` the paths. For each pose, at its time, ``/tf``
+has camera in world, ``/pose`` the same as a pose, ``/boxes`` the boxes of the image and
+``/outlines`` the outlines of the objects in it, in undistorted pixels. ``/calibration`` is the
+pinhole of these pixels.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from dqslam._colors import ESTIMATE, GRAY, ODOMETRY, TRUTH
 from dqslam._files import whole_file
 from dqslam.view.picture import outlines_in_image
 from dqslam.view.scene import Scene, SceneObject, rgb
+from dqslam.view.surfaces import SurfaceMesh, coarser
 
 if TYPE_CHECKING:
     from foxglove import Context
@@ -31,6 +32,7 @@ WORLD, CAMERA = "world", "camera"
 _LATEST_S = 2.0**32 - 1.0
 _CORNER = 0.5  # Foxglove counts pixels from the corner of the image
 _LABEL_M = 0.05
+_MOST_TRIANGLES = 5_000  # of a surface, which is repeated every second when it is live
 
 
 def write_mcap(
@@ -189,8 +191,10 @@ def _object(row: int, one: SceneObject, stamp: Any) -> Any:
         TextPrimitive,
     )
 
-    spheres, cubes, cylinders = [], [], []
-    if one.body is not None:
+    spheres, cubes, cylinders, triangles = [], [], [], []
+    if one.surface is not None:
+        triangles.append(_triangles(one, one.surface))
+    elif one.body is not None:
         placed: dict[str, Any] = {
             "pose": _pose(one.center, one.body.orientation_xyzw),
             "size": _vector(2.0 * one.body.half_lengths),
@@ -223,8 +227,23 @@ def _object(row: int, one: SceneObject, stamp: Any) -> Any:
         spheres=spheres,
         cubes=cubes,
         cylinders=cylinders,
+        triangles=triangles,
         texts=[text],
         metadata=_metadata(one),
+    )
+
+
+def _triangles(one: SceneObject, surface: SurfaceMesh) -> Any:
+    """Return the surface of an object, which is in the frame of its ellipsoid."""
+    from foxglove.messages import Color, Point3, TriangleListPrimitive
+
+    assert one.orientation_xyzw is not None  # of each object with a surface
+    drawn = coarser(surface, _MOST_TRIANGLES)
+    return TriangleListPrimitive(
+        pose=_pose(one.center, one.orientation_xyzw),
+        points=[Point3(x=x, y=y, z=z) for x, y, z in drawn.vertices.tolist()],
+        colors=[Color(r=r, g=g, b=b, a=1.0) for r, g, b in (drawn.colors / 255).tolist()],
+        indices=drawn.triangles.ravel().tolist(),
     )
 
 

@@ -14,6 +14,7 @@ from dqslam._checks import Floats
 from dqslam._colors import ESTIMATE, ODOMETRY, TRUTH
 from dqslam.view.picture import draw_image
 from dqslam.view.scene import Scene, SceneObject, Spread, rgb
+from dqslam.view.surfaces import SurfaceMesh
 
 if TYPE_CHECKING:
     from viser import ViserServer
@@ -119,7 +120,8 @@ class _Page:
             node = _solid(self.server, f"/objects/{row}", one, one.color, opacity=0.85)
             if node is not None:
                 node.on_click(self._on_click(row))
-                self.nodes[row] = node
+                if one.surface is None:  # a mesh with colors has no opacity
+                    self.nodes[row] = node
         return group
 
     def _on_click(self, row: int) -> Callable[[Any], None]:
@@ -214,6 +216,8 @@ def _solid(
     wireframe: bool = False,
 ) -> Any:
     """Add an object; return None if it has no surface."""
+    if isinstance(one, SceneObject) and one.surface is not None:
+        return _surface(server, name, one, one.surface)
     if isinstance(one, SceneObject) and one.body is not None:
         surface = one.body.mesh
         return server.scene.add_mesh_simple(
@@ -238,6 +242,18 @@ def _solid(
         subdivisions=2 if wireframe else 4,
         **_placed(np.concatenate([one.center, one.orientation_xyzw])),
     )
+
+
+def _surface(server: ViserServer, name: str, one: SceneObject, surface: SurfaceMesh) -> Any:
+    """Add a surface, whose vertices are in the frame of the object's ellipsoid."""
+    import trimesh
+
+    assert one.orientation_xyzw is not None  # of each object with a surface
+    mesh = trimesh.Trimesh(
+        surface.vertices, surface.triangles, vertex_colors=surface.colors, process=False
+    )
+    pose = _placed(np.concatenate([one.center, one.orientation_xyzw]))
+    return server.scene.add_mesh_trimesh(name, mesh, **pose)
 
 
 def _placed(pose: Floats) -> dict[str, Any]:

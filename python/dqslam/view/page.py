@@ -21,11 +21,16 @@ from dqslam._outputs import output_set
 from dqslam.io.files import write_text
 from dqslam.view.body import Body
 from dqslam.view.scene import Scene, SceneObject, Spread
+from dqslam.view.surfaces import SurfaceMesh, coarser
 
 _STATIC = Path(__file__).with_name("static")
 WRITTEN_BY = "dqslam view"
 # Micrometers and microradians are enough; more digits would only make the file larger.
 _DECIMALS = 6
+_SURFACE_DECIMALS = 4
+# Triangles of all surfaces together, and of one, which a browser without a graphics card turns
+# without a delay that is felt.
+_MOST_TRIANGLES, _MOST_OF_ONE, _LEAST_OF_ONE = 8_000, 2_000, 100
 
 
 def write_page(scene: Scene, directory: str | Path) -> Path:
@@ -59,6 +64,8 @@ def write_page_files(
 def _describe(scene: Scene) -> dict[str, Any]:
     boxes = scene.boxes
     names = ("fx", "fy", "cx", "cy", "width", "height")
+    surfaces = sum(one.surface is not None for one in scene.objects)
+    most = int(np.clip(_MOST_TRIANGLES // max(surfaces, 1), _LEAST_OF_ONE, _MOST_OF_ONE))
     return {
         "title": scene.title,
         "up": _rounded(scene.up),
@@ -70,7 +77,10 @@ def _describe(scene: Scene) -> dict[str, Any]:
         "cameras": scene.cameras.tolist(),
         "poseSpreads": [_spread(one) for one in scene.pose_spreads],
         "truth": [_rounded(run) for run in scene.truth],
-        "objects": [_object(one) for one in scene.objects],
+        "objects": [
+            _object(one) | {"surface": None if one.surface is None else _surface(one.surface, most)}
+            for one in scene.objects
+        ],
         "trueObjects": [_object(one) for one in scene.true_objects],
         "boxes": {
             "pose": boxes.pose.tolist(),
@@ -104,6 +114,15 @@ def _body(one: Body) -> dict[str, Any]:
         "shape": one.shape,
         "hull": _rounded(one.hull),
         "lines": [_rounded(line) for line in one.lines],
+    }
+
+
+def _surface(one: SurfaceMesh, most: int) -> dict[str, Any]:
+    drawn = coarser(one, most)
+    return {
+        "vertices": np.round(drawn.vertices, _SURFACE_DECIMALS).tolist(),
+        "triangles": drawn.triangles.tolist(),
+        "colors": drawn.colors.tobytes().hex(),  # six digits for each vertex
     }
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,6 +22,9 @@ from dqslam.metrics import Align, Alignment, up_direction
 from dqslam.solids import Solids
 from dqslam.view.body import Body, body_of
 from dqslam.view.numbers import Numbers, object_numbers, overview, true_object_numbers
+
+if TYPE_CHECKING:
+    from dqslam.view.surfaces import SurfaceMesh
 
 # The true path has a gap if its poses are further apart than this multiple of the usual distance.
 GAP = 5.0
@@ -65,6 +68,8 @@ class SceneObject:
     """Its properties as text."""
     body: Body | None = None
     """What it is if it is a cuboid or a cylinder, for which the ellipsoid only stands."""
+    surface: SurfaceMesh | None = None
+    """Its surface from depth images, in its own frame; None without one."""
     chi_square: float | None = None
     """Median chi-square of its boxes that no border cuts, 3.36 is usual; None without any."""
 

@@ -6,6 +6,7 @@
 const CIRCLE = Array.from({ length: 49 }, (_, k) => [Math.cos(k * Math.PI / 24), Math.sin(k * Math.PI / 24)]);
 
 const MOST_DETAILED = 200; // objects with light and rings
+const LEAST_SURFACE = 6; // pixels that an object is long if its surface is drawn instead of its body
 
 class SpaceView {
   /**
@@ -15,6 +16,7 @@ class SpaceView {
   constructor(canvas, scene, { shapes, trueShapes, boxesOf }, { onPick, onChange }) {
     Object.assign(this, { canvas, scene, shapes, trueShapes, boxesOf });
     this.drawn = [];
+    this.surfaces = scene.objects.map((object) => object.surface && new Surface(object));
     const path = scene.estimate.map((pose) => pose.slice(0, 3));
     this.everything = [...path, ...this.near(path)];
     this.orbit = new Orbit(canvas, scene.up, this.everything, onChange);
@@ -86,7 +88,7 @@ class SpaceView {
     this.context.scale(ratio, ratio);
     this.context.lineJoin = "round";
     this.eye = this.orbit.look();
-    this.counts = { ellipsoids: 0, labels: 0, covariances: 0, cameras: 0, trueObjects: 0, odometry: 0, truth: 0, estimate: 0 };
+    this.counts = { ellipsoids: 0, triangles: 0, labels: 0, covariances: 0, cameras: 0, trueObjects: 0, odometry: 0, truth: 0, estimate: 0 };
     this.drawn = [];
     this.drawGrid();
     const items = [];
@@ -210,6 +212,11 @@ class SpaceView {
     if (shown.objects) {
       this.addOutline(items, object, this.shapes[row], { mapped: row }, (outline) => {
         const isDetailed = outline.long >= this.detailed;
+        if (shown.surfaces && this.surfaces[row] && outline.long >= LEAST_SURFACE) {
+          this.counts.triangles += this.surfaces[row].draw(this.context, this.eye);
+          if (isSelected) this.fill(outline, "#0000", style);
+          return;
+        }
         this.fill(outline, isDetailed ? this.shade(outline, color) : color + "d0", isDetailed || isSelected ? style : null);
         if (isDetailed) this.drawRings(object);
         this.counts.ellipsoids += 1;
