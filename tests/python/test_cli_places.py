@@ -110,6 +110,7 @@ def test_changes_that_are_read_are_those_that_were_written(files):
         ("status", "gone", "status is 'gone', not one of stayed"),
         ("size", -1.0, "size is -1 m, not positive"),
         ("first_center", [0.0, 1.0], "first_center: expected shape"),
+        ("first_id", None, "has one of first_id and first_center without the other"),
         ("looks", None, "objects row 2: "),
     ],
 )

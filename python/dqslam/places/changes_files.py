@@ -101,13 +101,16 @@ def _change(entry: dict[str, Any]) -> Change:
         name: None if entry[name] is None else as_floats(name, entry[name], list(shape))
         for name, shape in shapes.items()
     }
-    if arrays["first_center"] is None and arrays["second_center"] is None:
-        raise ValueError("has neither first_center nor second_center")
-    significance = entry["significance"]
     ids = {
         name: None if entry[name] is None else int(entry[name])
         for name in ("first_id", "second_id")
     }
+    for name in ("first", "second"):
+        if (ids[f"{name}_id"] is None) != (arrays[f"{name}_center"] is None):
+            raise ValueError(f"has one of {name}_id and {name}_center without the other")
+    if arrays["first_center"] is None and arrays["second_center"] is None:
+        raise ValueError("has neither first_center nor second_center")
+    significance = entry["significance"]
     return Change(
         status=entry["status"],
         probability=float(entry["probability"]),
