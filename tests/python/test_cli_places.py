@@ -50,6 +50,7 @@ def test_locate_writes_a_row_for_each_image(files, capsys):
     assert rows[2]["reason"].startswith("too few: 2 of 2 boxes")
     assert [one["found"] for one in printed["images"]] == [True, True, False]
     assert np.shape(printed["images"][0]["candidates"][0]["covariance"]) == (6, 6)
+    assert (files / "out" / "locations.png").stat().st_size > 10_000
 
 
 def test_locate_prints_why_there_is_no_answer(files, capsys):
