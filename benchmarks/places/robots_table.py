@@ -55,6 +55,7 @@ def _show(found: list[merging.Trial]) -> None:
         "merged centers, error [m]": [one.merged_m for one in aligned],
         "first map alone [m]": [one.single_m[0] for one in aligned],
         "second map alone [m]": [one.single_m[1] for one in aligned],
+        "the better one of both [m]": [min(one.single_m) for one in aligned],
         "NEES of the first map alone / 3": [one.single_nees[0] for one in aligned],
         "NEES of the second map alone / 3": [one.single_nees[1] for one in aligned],
     }

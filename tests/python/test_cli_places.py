@@ -6,7 +6,9 @@ import json
 import numpy as np
 import pytest
 
+import dqslam as dq
 from dqslam.cli import main
+from dqslam.places.changes_files import read_changes, write_changes
 from orbit import CAMERA
 from small_place import CENTERS, NAMES, boxes_at, pose_at, write_map
 
@@ -48,6 +50,7 @@ def test_locate_writes_a_row_for_each_image(files, capsys):
     assert rows[2]["reason"].startswith("too few: 2 of 2 boxes")
     assert [one["found"] for one in printed["images"]] == [True, True, False]
     assert np.shape(printed["images"][0]["candidates"][0]["covariance"]) == (6, 6)
+    assert (files / "out" / "locations.png").stat().st_size > 10_000
 
 
 def test_locate_prints_why_there_is_no_answer(files, capsys):
@@ -77,6 +80,52 @@ def test_changes_writes_a_table_and_a_figure(files, capsys):
     assert float(rows[3]["distance"]) == pytest.approx(0.5, abs=0.02)
     assert printed["objects"][3]["second_center"] == pytest.approx(centers[3].tolist())
     assert (out / "changes.png").stat().st_size > 10_000
+    assert main(["plot", str(out), "--kind", "png"]) == 0
+    # The file has all that the figure needs.
+    figure = (out / "figures" / "changes.png").read_bytes()
+    assert figure == (out / "changes.png").read_bytes()
+
+
+def test_changes_that_are_read_are_those_that_were_written(files):
+    centers = CENTERS.copy()
+    centers[3] += [0.4, -0.3, 0.0]
+    found = dq.changes(files / "map", write_map(files / "after", centers))
+    write_changes(files, found)
+    read = read_changes(files / "changes.json")
+    assert [one.status for one in read.objects] == [one.status for one in found.objects]
+    np.testing.assert_array_equal(read.second_from_first, found.second_from_first)
+    np.testing.assert_array_equal(read.cameras, found.cameras)
+    for one, other in zip(read.objects, found.objects, strict=True):
+        for name, value in vars(one).items():
+            expected = getattr(other, name)
+            assert (value is None) == (expected is None)
+            if isinstance(value, str):
+                assert value == expected
+            elif value is not None:
+                np.testing.assert_allclose(value, expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        ("status", "gone", "status is 'gone', not one of stayed"),
+        ("size", -1.0, "size is -1 m, not positive"),
+        ("first_center", [0.0, 1.0], "first_center: expected shape"),
+        ("first_id", None, "has one of first_id and first_center without the other"),
+        ("looks", None, "objects row 2: "),
+    ],
+)
+def test_wrong_changes_are_refused_with_their_row(files, capsys, key, value, said):
+    write_changes(files, dq.changes(files / "map", files / "map"))
+    path = files / "changes.json"
+    content = json.loads(path.read_text())
+    content["objects"][2][key] = value
+    path.write_text(json.dumps(content))
+    assert main(["plot", str(files)]) == 2
+    printed = capsys.readouterr().err
+    assert "changes.json: objects row 2: " in printed
+    assert said in printed
+    assert not (files / "figures").exists()
 
 
 def test_changes_refuses_a_file_without_a_motion(files, capsys):

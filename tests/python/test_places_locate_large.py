@@ -11,6 +11,8 @@ from dqslam.places.locate_hypotheses import Hypotheses
 from dqslam.places.locate_map import REACH
 from dqslam.places.locate_pairs import (
     _MOST_COMPARED,
+    AGREE,
+    AGREE_LARGE,
     Pairings,
     _agrees,
     _reaches,
@@ -42,23 +44,24 @@ def strewn(random, boxes, objects, extent):
     )
 
 
+@pytest.mark.parametrize("agree", [AGREE, AGREE_LARGE])
 @pytest.mark.parametrize("seed", range(3))
-def test_no_pair_that_agrees_is_beyond_the_reach(seed):
+def test_no_pair_that_agrees_is_beyond_the_reach(seed, agree):
     pairings = strewn(np.random.default_rng(seed), boxes=5, objects=60, extent=15.0)
     boxes = np.arange(5)
-    found = agreeing_pairs(pairings, boxes, _reaches(pairings, boxes))
+    found = agreeing_pairs(pairings, boxes, _reaches(pairings, boxes, agree), agree)
     i, j = np.triu_indices(len(pairings), 1)
     other = pairings.box[i] != pairings.box[j]
     i, j = i[other], j[other]
     distance = np.linalg.norm(pairings.center[i] - pairings.center[j], axis=1)
-    expected = np.column_stack([i, j])[_agrees(pairings, i, j, distance)]
+    expected = np.column_stack([i, j])[_agrees(pairings, i, j, distance, agree)]
     assert len(expected) > 100
     assert set(map(tuple, found.tolist())) == set(map(tuple, expected.tolist()))
 
 
 def test_boxes_are_left_out_until_few_enough_pairs_are_compared():
     pairings = strewn(np.random.default_rng(1), boxes=10, objects=3000, extent=150.0)
-    boxes, reach = within_budget(pairings, np.arange(10))
+    boxes, reach = within_budget(pairings, np.arange(10), AGREE)
     assert 3 <= len(boxes) < 10
     trees = [cKDTree(pairings.center[pairings.box == one]) for one in boxes.tolist()]
     pairs = [
@@ -69,12 +72,12 @@ def test_boxes_are_left_out_until_few_enough_pairs_are_compared():
     # At the border of the square there are fewer.
     assert len(boxes) == 3 or 0.4 * _MOST_COMPARED < sum(pairs) < _MOST_COMPARED
     few = strewn(np.random.default_rng(1), boxes=10, objects=30, extent=15.0)
-    assert len(within_budget(few, np.arange(10))[0]) == 10
+    assert len(within_budget(few, np.arange(10), AGREE)[0]) == 10
 
 
 def test_no_box_has_no_reach():
     none = strewn(np.random.default_rng(0), boxes=1, objects=0, extent=1.0)
-    boxes, reach = within_budget(none, np.zeros(0, dtype=np.int64))
+    boxes, reach = within_budget(none, np.zeros(0, dtype=np.int64), AGREE)
     assert (boxes.shape, reach.shape) == ((0,), (0, 0))
 
 

@@ -39,7 +39,10 @@ def locate(
     out: Annotated[
         Path | None,
         typer.Option(
-            "--out", "-o", metavar="DIR", help="Directory for locations.csv and locations.json."
+            "--out",
+            "-o",
+            metavar="DIR",
+            help="Directory for locations.csv, locations.json and locations.png.",
         ),
     ] = None,
     min_score: Annotated[
@@ -59,6 +62,7 @@ def locate(
     """
     from dqslam import io
     from dqslam._outputs import output_set
+    from dqslam.cli.results import draw_figure
     from dqslam.places.locate_files import described, locate_files, write_locations
 
     inputs = (known, *files.files, odometry)
@@ -81,13 +85,21 @@ def locate(
     if out is not None:
         with output_set(out, "dqslam locate", inputs=inputs) as folder:
             write_locations(folder, answers)
+
+            def draw(path: Path) -> None:
+                from dqslam.places.landmarks import read_landmarks
+                from dqslam.plot.locations import plot_locations
+
+                plot_locations(read_landmarks(known), answers, path)
+
+            why_not = draw_figure(output, folder / "locations.png", draw)
     output.table(_table(answers))
     found = sum(one.location.is_found for one in answers)
     output.line(f"{found} of {len(answers)} located")
     for sentence in notes.sentences():
         output.warn(sentence)
     if out is not None:
-        output.line(f"wrote {out}")
+        output.line(why_not or f"wrote {out}")
     output.document({"images": [described(one) for one in answers]})
 
 

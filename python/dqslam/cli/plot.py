@@ -26,6 +26,7 @@ from dqslam.cli.settings import ConfigFile, save_settings
 if TYPE_CHECKING:
     from dqslam.io import Results
 
+CHANGES_FILE = "changes.json"
 _STILLS = 9  # number of images, evenly spread, if no frames are given
 
 
@@ -35,7 +36,7 @@ def plot(
         Path,
         typer.Argument(
             metavar="DIR",
-            help="Directory that `dqslam run`, `dqslam simulate` or `dqslam sweep` wrote.",
+            help="Directory that `dqslam run`, `simulate`, `sweep` or `changes` wrote.",
         ),
     ],
     out: Annotated[
@@ -93,7 +94,8 @@ def plot(
 ) -> None:
     """Draw the results in DIR: the map from above, errors over time, residuals, boxes.
 
-    For a sweep, it draws the errors against the varied settings. It needs the extra "plot".
+    For a sweep, it draws the errors against the varied settings, for changes the map from above
+    with what became of each object. It needs the extra "plot".
     docs/plots.md describes each figure. Options are written to plot.toml beside the figures.
     """
     from dqslam import io
@@ -118,6 +120,8 @@ def plot(
     with output_set(out, "dqslam plot", inputs=inputs) as folder:
         if _is_sweep(directory):
             files = [_plot_sweep(directory, folder, kind, parameter, output)]
+        elif _is_changes(directory):
+            files = [_plot_changes(directory, folder / f"changes.{kind}", output)]
         else:
             if parameter is not None:
                 raise ValueError(f"--parameter needs a sweep, which {directory} is not")
@@ -175,6 +179,20 @@ def _plot_sweep(
     check_files(directory, [SUMMARY])
     with output.waiting("drawing"):
         save_figure(draw_sweep(read_summary(directory), parameter), path)
+    return path
+
+
+def _is_changes(directory: Path) -> bool:
+    return (directory / CHANGES_FILE).is_file() and not (directory / "trajectory.txt").exists()
+
+
+def _plot_changes(directory: Path, path: Path, output: Output) -> Path:
+    from dqslam.places.changes_files import read_changes
+    from dqslam.plot.changes import plot_changes
+
+    found = read_changes(directory / CHANGES_FILE)
+    with output.waiting("drawing"):
+        plot_changes(found, path)
     return path
 
 

@@ -10,13 +10,16 @@ import numpy as np
 
 from dqslam._checks import Floats, as_covariances, as_floats
 from dqslam.io.files import FileError, read_text, write_json, write_text
-from dqslam.places.changes import Change, Changes
+from dqslam.places.changes import STATUSES, Change, Changes
 from dqslam.places.changes_frames import covariance_in_b
 
 _COLUMNS = (
     *("status", "probability", "first_id", "second_id", "class_name"),
     *("x1", "y1", "z1", "x2", "y2", "z2", "distance", "sigma", "significance", "looks"),
 )
+CHANGES_FILE = "changes.json"
+# Poses of cameras in the file, at most: enough to draw their path.
+_MOST_CAMERAS = 300
 
 
 def read_alignment(path: str | Path) -> tuple[Floats, Floats | None]:
@@ -50,7 +53,74 @@ def write_changes(folder: Path, found: Changes) -> None:
     """Write ``changes.csv``, a row for each object, and ``changes.json`` into a folder."""
     rows = [",".join(_COLUMNS), *(",".join(_cells(one)) for one in found.objects)]
     write_text(folder / "changes.csv", "\n".join(rows) + "\n")
-    write_json(folder / "changes.json", described(found))
+    step = -(-max(len(found.cameras), 1) // _MOST_CAMERAS)
+    cameras = {"cameras": found.cameras[::step]}
+    write_json(folder / CHANGES_FILE, described(found) | cameras)
+
+
+def read_changes(path: str | Path) -> Changes:
+    """Read ``changes.json``; the cameras are those that it has, evenly spread.
+
+    Raises
+    ------
+    FileError
+        If the file is missing or wrong; the error names the row of an object.
+    """
+    try:
+        content = json.loads(read_text(path))
+    except json.JSONDecodeError as error:
+        raise FileError(path, f"not JSON: {error.msg}", error.lineno) from None
+    rows = content.get("objects") if isinstance(content, dict) else None
+    if not isinstance(rows, list):
+        raise FileError(path, "has no list of objects")
+    found = []
+    for row, entry in enumerate(rows):
+        try:
+            found.append(_change(entry))
+        except KeyError as error:
+            raise FileError(path, f"objects row {row}: no {error.args[0]}") from None
+        except (ValueError, TypeError) as error:
+            raise FileError(path, f"objects row {row}: {error}") from None
+    try:
+        pose = as_floats("second_from_first", content.get("second_from_first"), [4, 4])
+        cameras = as_floats("cameras", content.get("cameras") or np.zeros((0, 7)), [None, 7])
+    except ValueError as error:
+        raise FileError(path, str(error)) from None
+    return Changes(tuple(found), pose, cameras, str(content.get("frame", "")))
+
+
+def _change(entry: dict[str, Any]) -> Change:
+    """Return an object of the file."""
+    if entry["status"] not in STATUSES:
+        raise ValueError(f"status is {entry['status']!r}, not one of {', '.join(STATUSES)}")
+    size = as_floats("size", entry["size"], [])
+    if not size > 0.0:
+        raise ValueError(f"size is {size:g} m, not positive")
+    shapes = {"first_center": [3], "second_center": [3], "displacement": [3], "covariance": [3, 3]}
+    arrays = {
+        name: None if entry[name] is None else as_floats(name, entry[name], list(shape))
+        for name, shape in shapes.items()
+    }
+    ids = {
+        name: None if entry[name] is None else int(entry[name])
+        for name in ("first_id", "second_id")
+    }
+    for name in ("first", "second"):
+        if (ids[f"{name}_id"] is None) != (arrays[f"{name}_center"] is None):
+            raise ValueError(f"has one of {name}_id and {name}_center without the other")
+    if arrays["first_center"] is None and arrays["second_center"] is None:
+        raise ValueError("has neither first_center nor second_center")
+    significance = entry["significance"]
+    return Change(
+        status=entry["status"],
+        probability=float(entry["probability"]),
+        class_name=str(entry["class_name"]),
+        significance=None if significance is None else float(significance),
+        size=float(size),
+        looks=float(entry["looks"]),
+        **ids,
+        **arrays,
+    )
 
 
 def described(found: Changes) -> dict[str, Any]:

@@ -77,18 +77,20 @@ def judge(a: Objects, target: Target, model: MotionModel, motions: Motions) -> l
     return distinct
 
 
-def tail_of(evidences: Floats) -> Floats:
+def tail_of(evidences: Floats, possible: Bools) -> Floats:
     """Return by how much evidence grows where one in e of the wrong motions is left.
 
     ``evidences`` (m, c) are of the runners-up, by class. The tail is the mean excess of the better
     ones over the last of them; 1 is that of chance alone. Classes whose objects stand in rows or
-    groups have a longer one. Shape (c,).
+    groups have a longer one. Only runners-up that are ``possible``, (m,), have an excess: how badly
+    the others fit says nothing about rows or groups. Shape (c,).
     """
     count = min(_TAIL, len(evidences) // 2)
     if count < _LEAST_TAIL:
         return np.ones(evidences.shape[1])
-    tail = -np.sort(-evidences, axis=0)[:count]
-    return np.asarray(np.maximum(1.0, (tail[:-1] - tail[-1]).mean(axis=0)))
+    last = -np.sort(-evidences, axis=0)[count - 1]
+    excess = np.where(possible[:, None], np.maximum(evidences - last, 0.0), 0.0)
+    return np.asarray(np.maximum(1.0, excess.sum(axis=0) / (count - 1)))
 
 
 def lead(found: list[Hypothesis]) -> float:
@@ -99,7 +101,9 @@ def lead(found: list[Hypothesis]) -> float:
     if len(found) < 2:
         return float("inf")
     others = np.array([one.by_class for one in found[1:]])
-    ahead = (found[0].by_class - others[0]) / tail_of(others)
+    # Chance explains the others better, as clearly as it has to be excluded for the best one.
+    possible = np.array([one.evidence > -CHANCE for one in found[1:]])
+    ahead = (found[0].by_class - others[0]) / tail_of(others, possible)
     return float(ahead.sum())
 
 

@@ -13,6 +13,8 @@ import numpy as np
 
 from dqslam._checks import Bools, Floats, Ints
 from dqslam.places.locate_pairs import (
+    AGREE,
+    AGREE_LARGE,
     Pairings,
     agreeing_pairs,
     closed,
@@ -52,10 +54,11 @@ def find_hypotheses(
     ``whole`` (b,) are the boxes without cut edges, which are preferred. Pairs need ``upright``.
     """
     most = _MOST_TRIPLES_LARGE if is_large else _MOST_TRIPLES
+    agree = AGREE_LARGE if is_large else AGREE
     boxes, counts = np.unique(pairings.box, return_counts=True)
     chosen = boxes[np.lexsort((counts, ~whole[boxes]))[:_MOST_BOXES]]
-    chosen, reach = within_budget(pairings, chosen)
-    pairs = agreeing_pairs(pairings, chosen, reach)
+    chosen, reach = within_budget(pairings, chosen, agree)
+    pairs = agreeing_pairs(pairings, chosen, reach, agree)
     triples = triangles(pairs, len(pairings))
     if is_large and len(triples) > most:
         triples, pairs = closed(pairings, pairs, triples, most)

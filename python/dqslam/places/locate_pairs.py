@@ -18,9 +18,9 @@ from dqslam.places.locate_map import ImageBoxes, PlaceMap
 # The least probability of labels for an object among the hypotheses, relative to the best object.
 _LEAST_LABEL = 0.1
 # Pairs of objects that boxes are compared with, about, and the boxes that are left in any case.
-_MOST_COMPARED, _FEWEST_BOXES = 200_000, 3
-# Sigmas within which distances agree.
-_AGREE = 3.0
+_MOST_COMPARED, _FEWEST_BOXES = 100_000, 3
+# Sigmas within which distances agree in a small and in a large map, where many do by chance.
+AGREE, AGREE_LARGE = 3.0, 2.0
 # Relative error of a distance between objects, from their centers in the image and in the map, and
 # that of the middle of a box that the border cut.
 _DISTANCE_SIGMA, _CUT_SIGMA = 0.05, 0.15
@@ -84,7 +84,7 @@ def pair_up(place: PlaceMap, camera: _core.Camera, image: ImageBoxes) -> Pairing
     )
 
 
-def _reaches(pairings: Pairings, boxes: Ints) -> Floats:
+def _reaches(pairings: Pairings, boxes: Ints, agree: float) -> Floats:
     """Return the largest distances between objects that two boxes may show, (b, b), meters."""
     of_box = [pairings.box == one for one in boxes.tolist()]
     ray = np.array([pairings.ray[own][0] for own in of_box])
@@ -101,18 +101,19 @@ def _reaches(pairings: Pairings, boxes: Ints) -> Floats:
     ]
     by_ray = 0.5 * (high[:, None] + high[None, :]) * np.maximum(blur[:, None], blur[None, :])
     sigma = np.sqrt(error[:, None] ** 2 + error[None, :] ** 2 + by_ray**2)
-    return np.asarray(np.sqrt(np.maximum(np.max(corners, axis=0), 0.0)) + _AGREE * sigma)
+    return np.asarray(np.sqrt(np.maximum(np.max(corners, axis=0), 0.0)) + agree * sigma)
 
 
-def within_budget(pairings: Pairings, boxes: Ints) -> tuple[Ints, Floats]:
+def within_budget(pairings: Pairings, boxes: Ints, agree: float) -> tuple[Ints, Floats]:
     """Return as many of the boxes (b,) as the search has time for, and their reaches (b, b).
 
     Among thousands of objects of one class, boxes of objects that are near each other are compared
-    with few pairs of objects. At least three boxes are returned.
+    with few pairs of objects. At least three boxes are returned. ``agree`` are the sigmas within
+    which distances agree.
     """
     if not len(boxes):
         return boxes, np.zeros((0, 0))
-    reach = _reaches(pairings, boxes)
+    reach = _reaches(pairings, boxes, agree)
     count = np.array([np.sum(pairings.box == one) for one in boxes.tolist()], dtype=float)
     area = float(np.sort(np.ptp(pairings.center, axis=0))[-2:].prod())
     share = np.minimum(np.pi * reach**2 / max(area, 1e-12), 1.0)
@@ -124,7 +125,7 @@ def within_budget(pairings: Pairings, boxes: Ints) -> tuple[Ints, Floats]:
     return boxes[kept], reach[np.ix_(kept, kept)]
 
 
-def agreeing_pairs(pairings: Pairings, boxes: Ints, reach: Floats) -> Ints:
+def agreeing_pairs(pairings: Pairings, boxes: Ints, reach: Floats, agree: float) -> Ints:
     """Return pairs of pairings, the first of the lower box, whose distances agree, shape (p, 2)."""
     from scipy.spatial import cKDTree
 
@@ -137,11 +138,11 @@ def agreeing_pairs(pairings: Pairings, boxes: Ints, reach: Floats) -> Ints:
         for b in range(a + 1, len(of_box)):
             near = trees[a].sparse_distance_matrix(trees[b], reach[a, b], output_type="ndarray")
             i, j, distance = of_box[a][near["i"]], of_box[b][near["j"]], near["v"]
-            found.append(np.column_stack([i, j])[_agrees(pairings, i, j, distance)])
+            found.append(np.column_stack([i, j])[_agrees(pairings, i, j, distance, agree)])
     return np.concatenate(found)
 
 
-def _agrees(pairings: Pairings, i: Ints, j: Ints, distance: Floats) -> Bools:
+def _agrees(pairings: Pairings, i: Ints, j: Ints, distance: Floats, agree: float) -> Bools:
     """Tell whether objects are as far from each other as their boxes look, shape (p,)."""
     near, far = np.exp(pairings.log_distance[i]), np.exp(pairings.log_distance[j])
     cosine = (pairings.ray[i] * pairings.ray[j]).sum(axis=1)
@@ -152,7 +153,7 @@ def _agrees(pairings: Pairings, i: Ints, j: Ints, distance: Floats) -> Bools:
     by_ray = 0.5 * (near + far) * np.maximum(pairings.ray_sigma[i], pairings.ray_sigma[j])
     sigma = np.sqrt(by_near**2 + by_far**2 + by_ray**2)
     other = pairings.object_row[i] != pairings.object_row[j]
-    return np.asarray(other & (np.abs(seen - distance) < _AGREE * sigma))
+    return np.asarray(other & (np.abs(seen - distance) < agree * sigma))
 
 
 def triangles(pairs: Ints, count: int) -> Ints:

@@ -57,28 +57,31 @@ def _score_all(place: PlaceMap, pairings: Pairings, gain: Floats, found: Hypothe
 
 
 def _score_near(place: PlaceMap, pairings: Pairings, gain: Floats, found: Hypotheses) -> Floats:
-    """Compare each hypothesis with the objects before it."""
-    boxes, first, column = np.unique(pairings.box, return_index=True, return_inverse=True)
-    shape = len(place.ellipsoids), len(boxes)
-    gains, sigma = np.full(shape, -np.inf), np.ones(shape)
-    gains[pairings.object_row, column] = gain
-    sigma[pairings.object_row, column] = pairings.sigma
-    ray = pairings.ray[first]
-    log_half = place.size[pairings.object_row[first], 0] - pairings.log_distance[first]
-    sigma_ray = np.hypot(_RAY_SIGMA, _RAY_SHARE * np.exp(log_half))
-    score = np.zeros(len(found.position))
-    chunk = max(1, _MOST_CELLS // (place.in_reach * len(boxes)))
+    """Compare each hypothesis with the pairings of the objects before it."""
+    order = np.argsort(pairings.object_row, kind="stable")
+    bounds = np.searchsorted(pairings.object_row[order], np.arange(len(place.ellipsoids) + 1))
+    counts = np.diff(bounds)
+    half = np.exp(place.size[pairings.object_row, 0] - pairings.log_distance)
+    sigma_ray = np.hypot(_RAY_SIGMA, _RAY_SHARE * half)
+    boxes = int(pairings.box.max()) + 1
+    ahead = found.position + AHEAD * place.sensor.sight * found.rotation[:, :, 2]
+    _, rows = place.tree.query(ahead, k=place.in_reach)
+    score = np.zeros(len(ahead))
+    chunk = max(1, _MOST_CELLS // (place.in_reach * boxes))
     for start in range(0, len(score), chunk):
         part = slice(start, start + chunk)
-        rotation, position = found.rotation[part], found.position[part]
-        ahead = position + AHEAD * place.sensor.sight * rotation[:, :, 2]
-        _, rows = place.tree.query(ahead, k=place.in_reach)
-        inside = (place.ellipsoids[rows, :3] - position[:, None]) @ rotation
-        distance = np.sqrt((inside**2).sum(axis=2))
-        cosine = inside @ ray.T / distance[:, :, None]
-        error = 2.0 * (1.0 - cosine) / sigma_ray**2
-        apart = (np.log(distance) - place.size[rows, 0])[:, :, None] + log_half
-        error += (apart / sigma[rows]) ** 2
-        own = np.maximum(gains[rows] - 0.5 * error, 0.0)
-        score[part] = own.max(axis=1).sum(axis=1)
+        position, rotation, near = found.position[part], found.rotation[part], rows[part]
+        inside = (place.ellipsoids[near, :3] - position[:, None]) @ rotation
+        distance = np.sqrt((inside**2).sum(axis=2)).ravel()
+        each = counts[near.ravel()]  # pairings of each hypothesis and object
+        cell = np.repeat(np.arange(len(distance)), each)
+        step = np.arange(len(cell)) - np.repeat(np.cumsum(each) - each, each)
+        one = order[bounds[near.ravel()[cell]] + step]
+        cosine = (inside.reshape(-1, 3)[cell] * pairings.ray[one]).sum(axis=1) / distance[cell]
+        error = 2.0 * (1.0 - cosine) / sigma_ray[one] ** 2
+        error += ((np.log(distance)[cell] - pairings.log_distance[one]) / pairings.sigma[one]) ** 2
+        best = np.zeros((len(position), boxes))
+        hypothesis = cell // near.shape[1]
+        np.maximum.at(best, (hypothesis, pairings.box[one]), gain[one] - 0.5 * error)
+        score[part] = best.sum(axis=1)
     return score

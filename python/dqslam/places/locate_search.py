@@ -17,8 +17,8 @@ from dqslam.places.locate_score import SE3, Frame, Matches, Scored, Scorer
 # Hypotheses of each image that are compared with its boxes quickly, in a small and in a large map,
 # and scored.
 _MOST_QUICK, _MOST_QUICK_LARGE, _MOST_SCORED = 4000, 500, 24
-# Hypotheses that each round of assignment and refinement continues with.
-_MOST_REFINED = (24, 8, 8)
+# Hypotheses that each round of assignment and refinement continues with, likewise.
+_MOST_REFINED, _MOST_REFINED_LARGE = (24, 8, 8), (12, 4, 4)
 # Poses as near as this lead to the same: a share of the sight, and radians.
 _SAME_SHARE, _SAME_ANGLE = 0.03, 0.1
 # Side of the cells in which similar hypotheses are counted, and the number of grids; what makes
@@ -62,7 +62,8 @@ def find_places(place: PlaceMap, camera: _core.Camera, frames: list[Frame]) -> P
         return Places(poses, np.zeros(0), np.zeros((0, 6, 6)), matches, none, elsewhere)
     scorer = Scorer(place, camera, frames)
     scored = scorer.score(poses)
-    for most in _MOST_REFINED:
+    is_large = len(place.ellipsoids) > MOST_OBJECTS
+    for most in _MOST_REFINED_LARGE if is_large else _MOST_REFINED:
         scored = scored.select(distinct(scored.poses, scored.score, place.sensor.sight, most))
         poses, _ = scorer.refine(scored)
         scored = scorer.score(poses)

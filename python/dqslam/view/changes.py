@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from dqslam._checks import Floats, as_floats
+from dqslam._checks import Floats
 from dqslam._colors import GRAY, GREEN, ORANGE, SKY, VERMILLION
-from dqslam.io.files import FileError, read_text
+from dqslam.io.files import FileError
+from dqslam.places.changes import STATUSES, Change
+from dqslam.places.changes_files import read_changes
 from dqslam.view.scene import Scene, SceneObject
 
 COLORS = {
@@ -35,58 +36,37 @@ def with_changes(scene: Scene, path: str | Path) -> Scene:
     FileError
         If the file is missing or wrong, or names objects that the scene does not have.
     """
-    rows = _read(path)
+    found = read_changes(path)
     row_of = {one.id: row for row, one in enumerate(scene.objects)}
     objects, before = list(scene.objects), []
-    for row, entry in enumerate(rows):
-        try:
-            status, name = str(entry["status"]), str(entry["class_name"])
-            color = COLORS[status]
-            told = (("change", _described(entry)),)
-            second = entry["second_id"]
-            if second is not None:
-                if second not in row_of:
-                    raise ValueError(f"object {second} is not in the map: it is of another one")
-                place = row_of[second]
-                objects[place] = replace(
-                    objects[place],
-                    class_name=f"{objects[place].class_name}: {status}",
-                    color=color,
-                    numbers=(*told, *objects[place].numbers),
-                )
-            if second is None or status == "moved":
-                left = status if second is None else "left"
-                center = as_floats("first_center", entry["first_center"], [3])
-                size = float(entry["size"])
-                before.append(
-                    _sphere(int(entry["first_id"]), f"{name}: {left}", color, center, size, told)
-                )
-        except KeyError as error:
-            raise FileError(path, f"objects row {row}: no {error.args[0]}") from None
-        except (ValueError, TypeError) as error:
-            raise FileError(path, f"objects row {row}: {error}") from None
-    counts = [(f"{sum(one.get('status') == status for one in rows)}", status) for status in COLORS]
-    total = ", ".join(f"{count} {status}" for count, status in counts if count != "0")
+    for row, one in enumerate(found.objects):
+        color, told = COLORS[one.status], (("change", _described(one)),)
+        if one.second_id is not None:
+            if one.second_id not in row_of:
+                message = f"object {one.second_id} is not in the map: it is of another one"
+                raise FileError(path, f"objects row {row}: {message}")
+            place = row_of[one.second_id]
+            objects[place] = replace(
+                objects[place],
+                class_name=f"{objects[place].class_name}: {one.status}",
+                color=color,
+                numbers=(*told, *objects[place].numbers),
+            )
+        if one.first_id is None or one.first_center is None:
+            continue
+        if one.second_id is None or one.status == "moved":
+            name = f"{one.class_name}: {one.status if one.second_id is None else 'left'}"
+            before.append(_sphere(one.first_id, name, color, one.first_center, one.size, told))
+    counts = [(len(found.of(status)), status) for status in STATUSES]
+    total = ", ".join(f"{count} {status}" for count, status in counts if count)
     overview = (*scene.overview, ("changes", total))
     return replace(scene, objects=(*objects, *before), overview=overview)
 
 
-def _read(path: str | Path) -> list[dict[str, Any]]:
-    try:
-        content = json.loads(read_text(path))
-    except json.JSONDecodeError as error:
-        raise FileError(path, f"not JSON: {error.msg}", error.lineno) from None
-    rows = content.get("objects") if isinstance(content, dict) else None
-    if not isinstance(rows, list) or not all(isinstance(one, dict) for one in rows):
-        raise FileError(path, "has no list of objects")
-    return rows
-
-
-def _described(entry: dict[str, Any]) -> str:
-    text = f"{entry['status']}, probability {float(entry['probability']):.3f}"
-    if entry["status"] == "moved":
-        distance = np.linalg.norm(as_floats("displacement", entry["displacement"], [3]))
-        text += f", by {distance:.3g} m"
+def _described(one: Change) -> str:
+    text = f"{one.status}, probability {one.probability:.3f}"
+    if one.displacement is not None and one.status == "moved":
+        text += f", by {np.linalg.norm(one.displacement):.3g} m"
     return text
 
 
