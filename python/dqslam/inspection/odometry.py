@@ -13,8 +13,9 @@ from dqslam.inspection.tracks import doubles
 from dqslam.inspection.windows import LENGTHS
 from dqslam.io import Trajectory
 
-# Objects of which half are larger or smaller have lengths of another unit [m].
-LARGEST_M, SMALLEST_M = 20.0, 5e-4
+# Lengths have another unit if half of the objects are larger or smaller [m], or if the camera is
+# faster half of the time than cars and drones are [m/s].
+LARGEST_M, SMALLEST_M, FASTEST_M_S = 20.0, 5e-4, 40.0
 UNITS = {"millimeters": 1e-3, "centimeters": 1e-2, "kilometers": 1e3}
 USUAL_M = (0.01, 10.0)
 # A step is a jump if it is so many times as long, or as fast, as nine tenths of all steps.
@@ -26,7 +27,7 @@ MOST_DOUBLES = 0.1
 
 
 def check_units(evidence: Evidence) -> Finding | None:
-    """Check whether objects have sizes of objects, if lengths are meters."""
+    """Check whether objects have usual sizes, and the camera a usual speed, in meters."""
     views = evidence.windows()
     if views.given.unexplained > NOISY:
         raise NotEnoughDataError("the poses do not explain the boxes")
@@ -40,11 +41,11 @@ def check_units(evidence: Evidence) -> Finding | None:
     if size.size < len(LENGTHS):
         raise NotEnoughDataError("no object has a known distance")
     usual = float(np.median(size))
-    if SMALLEST_M <= usual <= LARGEST_M:
+    times, poses = evidence.trajectory
+    steps = np.linalg.norm(np.diff(poses[:, :3], axis=0), axis=1)
+    speed = float(np.median(steps / np.diff(times)))
+    if SMALLEST_M <= usual <= LARGEST_M and speed <= FASTEST_M_S:
         return None
-    length = np.sum(
-        np.linalg.norm(np.diff(evidence.trajectory.world_from_camera[:, :3], axis=0), axis=1)
-    )
     likely = [
         f"{unit} (--length-scale {meters:g})"
         for unit, meters in UNITS.items()
@@ -53,8 +54,8 @@ def check_units(evidence: Evidence) -> Finding | None:
     meant = f": they may be {' or '.join(likely)}" if likely else ""
     return Finding(
         "units",
-        f"objects would be {usual:.3g} m large, and the path {length:.3g} m long, if the positions "
-        f"of the poses were meters{meant}",
+        f"objects would be {usual:.3g} m large, the path {steps.sum():.3g} m long, and the camera "
+        f"{speed:.3g} m/s fast, if the positions of the poses were meters{meant}",
     )
 
 

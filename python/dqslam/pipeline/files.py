@@ -19,7 +19,7 @@ from dqslam.inspection import FATAL, find_jumps, first_findings
 from dqslam.io.results import GRAPH_FILE, write_graph
 from dqslam.io.results.save import write_estimate
 from dqslam.pipeline.conclude import RunResult
-from dqslam.pipeline.jumps import doubt_torn
+from dqslam.pipeline.jumps import doubt_jumps
 from dqslam.pipeline.options import Progress, RunFilesOptions
 from dqslam.pipeline.problem import kept_options
 from dqslam.pipeline.recording import run
@@ -137,9 +137,8 @@ def _run(
         reference=reference,
         progress=progress,
     )
-    estimate, boxes = result.estimate, result.detections
-    box_times = estimate.timestamps[boxes.pose]
-    doubts += doubt_torn(landmarks_of(estimate), box_times, boxes.object_id, jumps)
+    estimate = result.estimate
+    doubts += doubt_jumps(landmarks_of(estimate), result.detections, estimate.timestamps, jumps)
     report = {
         "camera": str(camera),
         "odometry": str(odometry),
