@@ -216,21 +216,26 @@ def left_over(explanation: Explanation) -> float:
 
 
 def _images(camera: _core.Camera) -> Iterable[BoxReading]:
+    """Return images that boxes may be of, each once, and not that of the camera."""
     size = np.array([camera.width, camera.height], dtype=float)
-    for image in SHARES:
-        yield BoxReading(image=image)
+    images = list(SHARES)
+    letterboxes: list[tuple[float, float]] = []
     for scale in SCALES:
-        width, height = np.round(scale * size).tolist()
-        yield BoxReading(image=(width, height))
+        images.append(_rounded(scale * size))
     for side in dict.fromkeys((max(camera.width, camera.height), *SQUARES)):
-        yield BoxReading(image=(side, side), letterbox=True)
-        yield BoxReading(image=(side, side))
         within = side / size.max() * size
-        wide, high = (np.ceil(within / STRIDE) * STRIDE).tolist()
-        if (wide, high) != (side, side):
-            yield BoxReading(image=(wide, high), letterbox=True)
-        wide, high = np.round(within).tolist()
-        yield BoxReading(image=(wide, high))
+        letterboxes += [(side, side), _rounded(np.ceil(within / STRIDE) * STRIDE)]
+        images += [(side, side), _rounded(within)]
+    known = (camera.width, camera.height)
+    yield from (BoxReading(image=one) for one in dict.fromkeys(images) if one != known)
+    yield from (
+        BoxReading(image=one, letterbox=True) for one in dict.fromkeys(letterboxes) if one != known
+    )
+
+
+def _rounded(size: Floats) -> tuple[float, float]:
+    width, height = np.round(size).tolist()
+    return width, height
 
 
 def _reaches(evidence: Evidence, reading: BoxReading) -> bool:

@@ -114,8 +114,14 @@ def doubt_torn(landmarks: Landmarks, times: Floats, object_id: Ints, jumps: Floa
 
 def _chosen(landmarks: Landmarks, rows: Bools) -> Landmarks:
     """Return some objects of a map."""
-    columns = {name: part for name, part in vars(landmarks).items() if isinstance(part, np.ndarray)}
-    names = tuple(np.array(landmarks.class_names, dtype=object)[rows])
     return replace(
-        landmarks, class_names=names, **{name: part[rows] for name, part in columns.items()}
+        landmarks,
+        object_ids=landmarks.object_ids[rows],
+        class_names=tuple(np.array(landmarks.class_names, dtype=object)[rows]),
+        centers=landmarks.centers[rows],
+        covariances=landmarks.covariances[rows],
+        semi_axes=landmarks.semi_axes[rows],
+        log_semi_axes_sigmas=landmarks.log_semi_axes_sigmas[rows],
+        orientations=landmarks.orientations[rows],
+        observations=landmarks.observations[rows],
     )
