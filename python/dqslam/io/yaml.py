@@ -35,6 +35,8 @@ def parse_yaml(path: str | Path, text: str) -> dict[str, Any]:
         def construct_mapping(self, node: Any, deep: bool = False) -> Any:
             before: dict[Any, Any] = {}
             for key, value in node.value if isinstance(node, yaml.MappingNode) else ():
+                if not isinstance(key, yaml.ScalarNode):
+                    continue
                 if before.setdefault(key.value, value.value) != value.value:
                     line = key.start_mark.line + 1
                     message = f"{str(key.value)[:40]} is there twice, with different values"
