@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import gzip
 import os
 import re
 import secrets
@@ -43,9 +44,19 @@ class FileErrors(FileError):
 
 
 def write_text(path: str | Path, parts: str | Iterable[str]) -> None:
-    """Write a text file, all of it or nothing."""
-    with whole_file(path) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as file:
-        file.writelines([parts] if isinstance(parts, str) else parts)
+    """Write a text file, all of it or nothing; packed by gzip if its name ends with ``.gz``."""
+    parts = [parts] if isinstance(parts, str) else parts
+    with whole_file(path) as temporary:
+        if temporary.suffix.lower() == ".gz":
+            # Without the time, so that the same text gives the same file.
+            with (
+                temporary.open("wb") as raw,
+                gzip.GzipFile("", "wb", fileobj=raw, mtime=0) as packed,
+            ):
+                packed.writelines(part.encode() for part in parts)
+        else:
+            with temporary.open("w", encoding="utf-8", newline="\n") as file:
+                file.writelines(parts)
 
 
 @contextlib.contextmanager

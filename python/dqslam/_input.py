@@ -1,6 +1,8 @@
-"""Input: files, gzip files (``.gz``), and standard input (``-``), as text.
+"""Input: files, gzip files, and standard input (``-``), as text.
 
-What can be read only once (standard input, pipes) is kept, since the format is recognized first.
+Files of gzip are those named ``.gz``, and any input that begins like one. Files of other packers
+are refused by their names. What can be read only once (standard input, pipes) is kept, since the
+format is recognized first.
 """
 
 from __future__ import annotations
@@ -20,6 +22,22 @@ MOST_BYTES = 2**30  #: a text that unpacks to more is refused
 HEAD_BYTES = 65536  #: what is looked at to recognize a format
 _BLOCK = 2**20
 _GZIP = 31  # zlib's name for a stream with the header of gzip
+_MAGIC_GZIP = b"\x1f\x8b"
+# What is no text by its first bytes, or by those at another place: how it is called, and the way to
+# read it.
+_UNPACK = "unpack it first (of packed files, only those of gzip are read)"
+_BAG = "bags are read from files with their own names, unpacked"
+_OTHERS = (
+    (0, b"BZh", "is packed with bzip2", _UNPACK),
+    (0, b"\xfd7zXZ\0", "is packed with xz", _UNPACK),
+    (0, b"\x28\xb5\x2f\xfd", "is packed with zstd", _UNPACK),
+    (0, b"7z\xbc\xaf", "is an archive of 7-Zip", _UNPACK),
+    (0, b"PK\x03\x04", "is a zip archive", _UNPACK),
+    (257, b"ustar", "is a tar archive", _UNPACK),
+    (0, b"SQLite format 3\0", "is a database, as bags of ROS 2 have it", _BAG),
+    (0, b"\x89MCAP0", "is a bag (mcap)", _BAG),
+    (0, b"#ROSBAG V", "is a bag of ROS 1", _BAG),
+)
 
 
 class InputWarning(UserWarning):
@@ -59,13 +77,15 @@ def refuse_shared_input(*paths: str | Path | None) -> None:
         raise ValueError("-: standard input can be only one of the inputs")
 
 
-def read_text(path: str | Path) -> str:
-    """Read a UTF-8 text; a missing, unreadable or empty one is a FileError."""
+def read_text(path: str | Path, *, may_be_blank: bool = False) -> str:
+    """Read a UTF-8 text; a missing, unreadable or (by default) blank one is a FileError."""
+    data = _content(path)
+    refuse_other_files(path, data)
     try:
-        text = _content(path).decode("utf-8-sig")
+        text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
         raise FileError(path, "is not a text file (UTF-8)") from None
-    if not text.strip():
+    if not may_be_blank and not text.strip():
         raise FileError(path, "is empty")
     # As Python's text files do, so that the numbers of lines are those of an editor.
     return text.replace("\r\n", "\n").replace("\r", "\n") if "\r" in text else text
@@ -73,19 +93,7 @@ def read_text(path: str | Path) -> str:
 
 def read_head(path: str | Path) -> str:
     """Return the first 64 KiB of a text, cut at the end of a line if it is longer; "" if none."""
-    if is_stream(path):
-        data = _content(path)[: HEAD_BYTES + 1]
-    else:
-        try:
-            with Path(path).open("rb") as file:
-                data = file.read(HEAD_BYTES + 1)
-        except OSError:
-            return ""
-        if _is_packed(path):
-            try:
-                data = zlib.decompressobj(_GZIP).decompress(data, HEAD_BYTES + 1)
-            except zlib.error:
-                return ""
+    data = _head(path)
     try:
         # A character may be cut in two at the end.
         text = codecs.getincrementaldecoder("utf-8-sig")().decode(data[:HEAD_BYTES])
@@ -94,12 +102,41 @@ def read_head(path: str | Path) -> str:
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
+def refuse_other_files(path: str | Path, data: bytes | None = None) -> None:
+    """Refuse what begins like an archive, a file of another packer, or a bag that is no file.
+
+    Without ``data``, the beginning of the file is read.
+    """
+    data = _head(path) if data is None else data
+    for start, magic, what, remedy in _OTHERS:
+        if data[start : start + len(magic)] == magic:
+            raise FileError(path, f"{what}: {remedy}")
+
+
+def _head(path: str | Path) -> bytes:
+    """Return the first bytes of a file, unpacked; none if they cannot be read."""
+    if is_stream(path):
+        return _content(path)[: HEAD_BYTES + 1]
+    try:
+        with Path(path).open("rb") as file:
+            data = file.read(HEAD_BYTES + 1)
+    except OSError:
+        return b""
+    if not _is_packed(path, data):
+        return data
+    try:
+        return zlib.decompressobj(_GZIP).decompress(data, HEAD_BYTES + 1)
+    except zlib.error:
+        return b""
+
+
 def _is_plain(path: str | Path) -> bool:
     return Path(path).is_file()
 
 
-def _is_packed(path: str | Path) -> bool:
-    return str(path).lower().endswith(".gz")
+def _is_packed(path: str | Path, data: bytes) -> bool:
+    """Return whether data are packed, by the name or the first bytes, which no text has."""
+    return data.startswith(_MAGIC_GZIP) or str(path).lower().endswith(".gz")
 
 
 def _content(path: str | Path) -> bytes:
@@ -114,7 +151,7 @@ def _content(path: str | Path) -> bytes:
         raise FileError(path, "no such file") from None
     except OSError as error:
         raise FileError(path, f"cannot be read: {error.strerror}") from None
-    return _unpacked(path, data) if _is_packed(path) else data
+    return _unpacked(path, data) if _is_packed(path, data) else data
 
 
 @cache

@@ -1,3 +1,4 @@
+import gzip
 import json
 
 import numpy as np
@@ -278,3 +279,41 @@ def test_numbers_are_written_as_they_are_meant(folder, call):
     assert "boxes of another image need the size of the camera's" in call(
         f"square.csv c.csv {options}"
     )
+
+
+def test_a_target_of_gzip_is_packed(folder, call):
+    assert call("boxes.csv packed.csv.gz") == "wrote packed.csv.gz: 2 boxes as csv\n"
+    assert gzip.decompress((folder / "packed.csv.gz").read_bytes()).decode() == BOXES
+    assert call("packed.csv.gz again.csv") == "wrote again.csv: 2 boxes as csv\n"
+    assert (folder / "again.csv").read_text() == BOXES
+    call("boxes.csv mot.txt.gz --to mot")
+    assert (folder / "mot.frames.csv").is_file()
+    assert "p.gz: its ending is of no format of detections" in call("boxes.csv p.gz")
+    assert "a folder of files" in call("boxes.csv b.gz --to yolo --camera camera.json")
+
+
+def test_a_target_is_standard_output(folder, monkeypatch, capfd):
+    monkeypatch.chdir(folder)
+    assert main(["convert", "boxes.csv", "-", "--to", "csv"]) == 0
+    assert capfd.readouterr() == (BOXES, "")
+    # There is no place for the times beside it.
+    assert main(["convert", "boxes.csv", "-", "--to", "mot"]) == 0
+    assert capfd.readouterr().out.startswith("1,4,450.24,315.81,")
+    assert sorted(file.name for file in folder.iterdir()) == [
+        "boxes.csv",
+        "camera.json",
+        "mot.txt",
+        "traj.txt",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ("", "-: standard output has no ending: name a format with --to"),
+        ("--to yolo --camera camera.json", "-: yolo is a folder, which standard output cannot be"),
+        ("--to csv --json", "-: standard output has what is converted"),
+    ],
+)
+def test_what_standard_output_cannot_be(call, options, message):
+    assert message in call(f"boxes.csv - {options}")

@@ -1,6 +1,7 @@
 """`dqslam run` and `inspect` on files that do not fit together, and on the same read as meant."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -107,6 +108,21 @@ def test_millimeters_are_doubtful(folder, capsys):
     assert call("run", folder, "--ids", "track_id") == 3
     assert "--length-scale 0.001" in capsys.readouterr().err
     assert call("run", folder, "--ids", "track_id", "--length-scale", "0.001") == 0
+
+
+def test_a_camera_that_is_too_fast_is_doubtful(folder, capsys):
+    """Objects of 30 times their sizes may be; a camera of 120 times its speed has another unit."""
+    times, poses = read_trajectory(folder / "odometry.txt")
+    speed = np.median(np.linalg.norm(np.diff(poses[:, :3], axis=0), axis=1) / np.diff(times))
+    large = poses * [30, 30, 30, 1, 1, 1, 1]
+    write_trajectory(folder / "odometry.txt", times, large)
+    assert call("inspect", folder, "--ids", "track_id", "--strict") == 0
+    write_trajectory(folder / "odometry.txt", times / 4, large)
+    edit_boxes(folder, lambda t: t / [4, 1, 1, 1, 1])
+    capsys.readouterr()
+    assert call("inspect", folder, "--ids", "track_id", "--strict") == 3
+    told = re.search(r"the camera (\S+) m/s fast", " ".join(capsys.readouterr().out.split()))
+    assert float(told[1]) == pytest.approx(120 * speed, rel=0.01)
 
 
 def test_strict_refuses_what_a_run_only_doubts(folder, capsys):

@@ -8,8 +8,10 @@ from benchmarks.mistakes import MISTAKES, files_of, noisier, warnings_of
 
 import dqslam as dq
 import realdata
-from dqslam.inspection import inspect_recording
+from dqslam import _core
+from dqslam.inspection import image_checks, inspect_recording
 from dqslam.io import read_camera, read_detections, read_trajectory
+from dqslam.io.readings import BoxReading
 
 WORLD, SEED = "orbit_rolls", 31
 # The odometry of that world is too noisy for these; a drive on the plane tells them.
@@ -83,3 +85,14 @@ def test_noise_that_hides_everything_is_said_not_reassured():
     assert inspection.findings == ()
     assert inspection.verdict.explained == "noisy"
     assert "readings cannot be told apart" in inspection.unchecked["unexplained"]
+
+
+def test_images_that_detectors_make_of_wide_ones_are_tried():
+    """Of 1280 x 720 px: 640 x 360, and that with bars of 12 px to 384, a multiple of 32."""
+    camera = _core.Camera(900, 900, 639.5, 359.5, 1280, 720)
+    tried = list(image_checks._images(camera))
+    assert BoxReading(image=(640, 360)) in tried
+    with_bars = BoxReading(image=(640, 384), letterbox=True)
+    assert with_bars in tried
+    assert len(set(tried)) == len(tried)
+    assert BoxReading(image=(1280, 720)) not in tried

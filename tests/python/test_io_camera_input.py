@@ -131,3 +131,13 @@ def test_what_would_end_a_parser_is_an_error_of_the_file(tmp_path, name, text, m
     path.write_text(text)
     with pytest.raises(FileError, match=message):
         read_camera(path)
+
+
+def test_a_key_that_is_there_twice_has_one_value(tmp_path):
+    text = json.dumps(dict(zip(KEYS, NUMBERS, strict=True)))
+    path = tmp_path / "camera.json"
+    path.write_text('{"fx": 500.5, ' + text[1:])
+    assert read_camera(path).fx == 500.5
+    path.write_text('{"fx": 600, ' + text[1:])
+    with pytest.raises(FileError, match="camera.json: fx is there twice, with different values"):
+        read_camera(path)

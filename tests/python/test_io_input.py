@@ -1,15 +1,19 @@
 """Files as .gz, standard input and pipes."""
 
+import bz2
 import gzip
 import io
+import lzma
 import os
+import tarfile
 import threading
+import zipfile
 
 import numpy as np
 import pytest
 
 from dqslam import _input
-from dqslam.io import FileError, read_camera, read_detections, read_trajectory
+from dqslam.io import FileError, frame_rate, read_camera, read_detections, read_trajectory
 
 CSV = "timestamp,x1,y1,x2,y2\n0.5,10,20,30,50\n0.5,11,20,30,50\n0.75,12,20,30,50\n"
 TUM = "0 1 2 3 0 0 0 1\n1 1 2 4 0 0 0 1\n"
@@ -17,9 +21,10 @@ TUM = "0 1 2 3 0 0 0 1\n1 1 2 4 0 0 0 1\n"
 
 @pytest.fixture
 def stdin(monkeypatch):
-    def give(text):
+    def give(content):
         _input._stdin.cache_clear()
-        stream = io.TextIOWrapper(io.BytesIO(text.encode()))
+        data = content if isinstance(content, bytes) else content.encode()
+        stream = io.TextIOWrapper(io.BytesIO(data))
         monkeypatch.setattr("sys.stdin", stream)
 
     yield give
@@ -49,6 +54,86 @@ def test_standard_input_is_recognized_by_its_content(stdin):
     stdin("")
     with pytest.raises(FileError, match="-: is empty"):
         read_detections("-")
+
+
+def test_standard_input_may_be_packed(stdin):
+    stdin(gzip.compress(CSV.encode()))
+    assert read_detections("-").box[:, 0].tolist() == [10, 11, 12]
+
+
+def packed(name, content):
+    """Return the bytes of a text that is packed by another program."""
+    out = io.BytesIO()
+    if name == "tar":
+        with tarfile.open(fileobj=out, mode="w") as archive:
+            member = tarfile.TarInfo("boxes.csv")
+            member.size = len(content)
+            archive.addfile(member, io.BytesIO(content))
+    elif name == "zip":
+        with zipfile.ZipFile(out, "w") as archive:
+            archive.writestr("boxes.csv", content)
+    else:
+        return {"bz2": bz2.compress, "xz": lzma.compress}[name](content)
+    return out.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("name", "what"),
+    [
+        ("tar", "a tar archive"),
+        ("zip", "a zip archive"),
+        ("bz2", "packed with bzip2"),
+        ("xz", "packed with xz"),
+    ],
+)
+def test_other_packers_are_refused_by_their_kind(tmp_path, stdin, name, what):
+    data = packed(name, CSV.encode())
+    for file, content in ((f"boxes.csv.{name}", data), ("boxes.csv.gz", gzip.compress(data))):
+        (tmp_path / file).write_bytes(content)
+        with pytest.raises(FileError, match=f"{file}: is {what}: unpack it first"):
+            read_detections(tmp_path / file)
+        with pytest.raises(FileError, match=f"{file}: is {what}: unpack it first"):
+            read_trajectory(tmp_path / file)
+    stdin(data)
+    with pytest.raises(FileError, match=f"-: is {what}"):
+        read_detections("-")
+
+
+@pytest.mark.parametrize(
+    ("begin", "what"),
+    [
+        (b"SQLite format 3\0" + bytes(90), "a database, as bags of ROS 2"),
+        (b"\x89MCAP0\r\n" + bytes(90), "a bag .mcap."),
+        (b"#ROSBAG V2.0\n" + bytes(90), "a bag of ROS 1"),
+    ],
+)
+def test_a_bag_is_not_read_from_standard_input(stdin, begin, what):
+    stdin(begin)
+    with pytest.raises(FileError, match=f"-: is {what}.*bags are read from files"):
+        read_detections("-")
+
+
+def test_a_packed_bag_is_refused(tmp_path):
+    (tmp_path / "drive.bag.gz").write_bytes(gzip.compress(b"#ROSBAG V2.0\n"))
+    with pytest.raises(FileError, match="drive.bag.gz: is a packed bag: unpack it first"):
+        read_trajectory(tmp_path / "drive.bag.gz")
+
+
+def test_a_folder_of_packed_labels_is_as_one_of_labels(tmp_path):
+    texts = {
+        "000004.txt": "2 0.5 0.5 0.25 0.5\n",
+        "000005.txt": " \n",
+        "000007.txt": "1 0.5 0.5 0.5 1\n",
+    }
+    for name, text in texts.items():
+        (tmp_path / f"{name}.gz").write_bytes(gzip.compress(text.encode()))
+    table = read_detections(tmp_path, width=100, height=80, frames=frame_rate(2.0), first_frame=4)
+    assert table.frame.tolist() == [0, 3]
+    # 100 (0.5 - 0.125) - 0.5 and 80 (0.5 - 0.25) - 0.5
+    np.testing.assert_allclose(table.box[0], [37, 19.5, 62, 59.5])
+    (tmp_path / "000007.txt").write_text(texts["000007.txt"])
+    with pytest.raises(FileError, match="has both 000007.txt and 000007.txt.gz"):
+        read_detections(tmp_path, width=100, height=80, frames=frame_rate(2.0), format="yolo")
 
 
 def test_standard_input_is_one_of_the_inputs_only():

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from dqslam._input import refuse_shared_input
+from dqslam._input import is_stdin, refuse_shared_input
 from dqslam.cli.groups import with_groups
 from dqslam.cli.output import Json, Output, Quiet
 from dqslam.cli.reading import ReadingOptions
@@ -19,7 +19,7 @@ def convert(
     source: Annotated[
         Path, typer.Argument(metavar="IN", help="File, YOLO folder, bag, or directory of results.")
     ],
-    out: Annotated[Path, typer.Argument(metavar="OUT", help="File or folder to write.")],
+    out: Annotated[Path, typer.Argument(metavar="OUT", help="File or folder, - for stdout.")],
     format_: Annotated[
         str | None,
         typer.Option("--format", metavar="NAME", help="Format of IN. Default: recognized."),
@@ -50,12 +50,15 @@ def convert(
     Directories of results are written as pose graphs, --to g2o or gtsam, or --to colmap-model.
 
     Formats: see docs/formats.md. All are read; written are json toml ros colmap kitti-calib, tum
-    kitti euroc, csv coco yolo mot. IN may be a .gz file, or - for standard input.
+    kitti euroc, csv coco yolo mot. Files may be packed (.gz), or - for standard input and output.
     If the format of OUT has no times, they go into a file beside it.
     """
     from dqslam import io
 
-    output = Output(quiet=quiet, as_json=json)
+    to_standard_output = is_stdin(out)
+    if json and to_standard_output:
+        raise ValueError("-: standard output has what is converted, so that --json has no place")
+    output = Output(quiet=quiet or to_standard_output, as_json=json)
     inputs = (source, camera, classes, *how.files)
     refuse_shared_input(*inputs, odometry_covariance)
     reading = how.read_options()

@@ -16,6 +16,7 @@ from dqslam.inspection.evidence import Evidence, NotEnoughDataError
 from dqslam.inspection.evidence import Finding as Finding
 from dqslam.inspection.image_checks import check_image_size
 from dqslam.inspection.odometry import check_doubles, check_units, note_jumps
+from dqslam.inspection.odometry import find_jumps as find_jumps
 from dqslam.inspection.pose_checks import Verdict as Verdict
 from dqslam.inspection.pose_checks import check_explained, check_poses, judge
 from dqslam.inspection.pose_checks import pixels as pixels

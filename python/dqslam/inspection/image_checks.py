@@ -45,10 +45,12 @@ ALIKE_PX = 5.0
 # the one alone favors larger images, the other one smaller ones.
 LESS_ANGLE = 0.85
 # Sizes of images that boxes may be of: shares, percent, per mille; scales of the camera's image;
-# and squares that detectors take, filled or with bars.
+# and squares that detectors take: filled, with bars, with bars to the next multiple of a stride
+# only, or with the image at their left and top.
 SHARES = ((1.0, 1.0), (100.0, 100.0), (1000.0, 1000.0))
 SCALES = (0.25, 1 / 3, 0.5, 2 / 3, 0.75, 0.8, 1.25, 4 / 3, 1.5, 2.0, 3.0, 4.0)
 SQUARES = (320, 416, 512, 608, 640, 800, 960, 1024, 1280)
+STRIDE = 32
 MOST_NAMED = 2
 
 
@@ -214,15 +216,26 @@ def left_over(explanation: Explanation) -> float:
 
 
 def _images(camera: _core.Camera) -> Iterable[BoxReading]:
+    """Return images that boxes may be of, each once, and not that of the camera."""
     size = np.array([camera.width, camera.height], dtype=float)
-    for image in SHARES:
-        yield BoxReading(image=image)
+    images = list(SHARES)
+    letterboxes: list[tuple[float, float]] = []
     for scale in SCALES:
-        width, height = np.round(scale * size).tolist()
-        yield BoxReading(image=(width, height))
+        images.append(_rounded(scale * size))
     for side in dict.fromkeys((max(camera.width, camera.height), *SQUARES)):
-        yield BoxReading(image=(side, side), letterbox=True)
-        yield BoxReading(image=(side, side))
+        within = side / size.max() * size
+        letterboxes += [(side, side), _rounded(np.ceil(within / STRIDE) * STRIDE)]
+        images += [(side, side), _rounded(within)]
+    known = (camera.width, camera.height)
+    yield from (BoxReading(image=one) for one in dict.fromkeys(images) if one != known)
+    yield from (
+        BoxReading(image=one, letterbox=True) for one in dict.fromkeys(letterboxes) if one != known
+    )
+
+
+def _rounded(size: Floats) -> tuple[float, float]:
+    width, height = np.round(size).tolist()
+    return width, height
 
 
 def _reaches(evidence: Evidence, reading: BoxReading) -> bool:

@@ -2,26 +2,32 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
+from dqslam._checks import Bools, Floats
 from dqslam.inspection.evidence import Evidence, Finding, NotEnoughDataError
 from dqslam.inspection.pose_checks import NOISY
 from dqslam.inspection.tracks import doubles
 from dqslam.inspection.windows import LENGTHS
+from dqslam.io import Trajectory
 
-# Objects of which half are larger or smaller have lengths of another unit [m].
-LARGEST_M, SMALLEST_M = 20.0, 5e-4
+# Lengths have another unit if half of the objects are larger or smaller [m], or if the camera is
+# faster half of the time than cars and drones are [m/s].
+LARGEST_M, SMALLEST_M, FASTEST_M_S = 20.0, 5e-4, 40.0
 UNITS = {"millimeters": 1e-3, "centimeters": 1e-2, "kilometers": 1e3}
 USUAL_M = (0.01, 10.0)
 # A step is a jump if it is so many times as long, or as fast, as nine tenths of all steps.
 JUMP, FAST = 6.0, 4.0
 GAP = 3.0  #: median intervals that make a gap
+FEWEST_POSES = 10  #: that tell what is usual
 # The share of boxes that repeat another one.
 MOST_DOUBLES = 0.1
 
 
 def check_units(evidence: Evidence) -> Finding | None:
-    """Check whether objects have sizes of objects, if lengths are meters."""
+    """Check whether objects have usual sizes, and the camera a usual speed, in meters."""
     views = evidence.windows()
     if views.given.unexplained > NOISY:
         raise NotEnoughDataError("the poses do not explain the boxes")
@@ -35,11 +41,11 @@ def check_units(evidence: Evidence) -> Finding | None:
     if size.size < len(LENGTHS):
         raise NotEnoughDataError("no object has a known distance")
     usual = float(np.median(size))
-    if SMALLEST_M <= usual <= LARGEST_M:
+    times, poses = evidence.trajectory
+    steps = np.linalg.norm(np.diff(poses[:, :3], axis=0), axis=1)
+    speed = float(np.median(steps / np.diff(times)))
+    if SMALLEST_M <= usual <= LARGEST_M and speed <= FASTEST_M_S:
         return None
-    length = np.sum(
-        np.linalg.norm(np.diff(evidence.trajectory.world_from_camera[:, :3], axis=0), axis=1)
-    )
     likely = [
         f"{unit} (--length-scale {meters:g})"
         for unit, meters in UNITS.items()
@@ -48,8 +54,8 @@ def check_units(evidence: Evidence) -> Finding | None:
     meant = f": they may be {' or '.join(likely)}" if likely else ""
     return Finding(
         "units",
-        f"objects would be {usual:.3g} m large, and the path {length:.3g} m long, if the positions "
-        f"of the poses were meters{meant}",
+        f"objects would be {usual:.3g} m large, the path {steps.sum():.3g} m long, and the camera "
+        f"{speed:.3g} m/s fast, if the positions of the poses were meters{meant}",
     )
 
 
@@ -66,25 +72,45 @@ def check_doubles(evidence: Evidence) -> Finding | None:
     )
 
 
-def note_jumps(evidence: Evidence) -> list[str]:
-    """Say where the odometry jumps, or has a gap that it crosses in one step."""
-    times, poses = evidence.trajectory
-    if len(times) < 10:
-        return []
+@dataclass(frozen=True)
+class Jumps:
+    """Steps of the odometry that are far longer than usual."""
+
+    jumps: Bools  #: (n - 1,) steps that are too fast as well
+    gaps: Bools  #: (n - 1,) others, which cross a gap in time
+    length: Floats  #: (n - 1,) of all steps, m
+    usual: float  #: nine tenths of all steps are not longer [m]
+
+
+def find_jumps(trajectory: Trajectory) -> Jumps:
+    """Find where a trajectory jumps, or has a gap that it crosses in one step."""
+    times, poses = trajectory
     steps = np.linalg.norm(np.diff(poses[:, :3], axis=0), axis=1)
     seconds = np.diff(times)
-    usual, fast = np.quantile(steps, 0.9), np.quantile(steps / seconds, 0.9)
+    if len(times) < FEWEST_POSES:
+        none = np.zeros(len(steps), dtype=bool)
+        return Jumps(none, none, steps, 0.0)
+    usual, fast = float(np.quantile(steps, 0.9)), np.quantile(steps / seconds, 0.9)
     jumps = (steps > JUMP * usual) & (steps / seconds > FAST * fast)
     gaps = (seconds > GAP * np.median(seconds)) & (steps > GAP * usual) & ~jumps
+    return Jumps(jumps, gaps, steps, usual)
+
+
+def note_jumps(evidence: Evidence) -> list[str]:
+    """Say where the odometry jumps, or has a gap that it crosses in one step."""
+    times = evidence.trajectory.timestamps
+    seconds = np.diff(times)
+    odd = find_jumps(evidence.trajectory)
+    steps = odd.length
     notes = []
-    for found, what in ((jumps, "jumps"), (gaps, "has a gap")):
+    for found, what in ((odd.jumps, "jumps"), (odd.gaps, "has a gap")):
         rows = np.flatnonzero(found)
         if rows.size:
             row = int(rows[np.argmax(steps[rows])])
             notes.append(
                 f"the odometry {what} {rows.size} time{'s' if rows.size > 1 else ''}: at "
                 f"{times[row]:.6g} s it moves by {steps[row]:.3g} m in {seconds[row]:.3g} s, "
-                f"usually by {usual:.2g} m at most. If it was lost there, "
+                f"usually by {odd.usual:.2g} m at most. If it was lost there, "
                 "--odometry-covariance says how uncertain that step is"
             )
     return notes

@@ -11,6 +11,7 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from dqslam import _core
+from dqslam._input import is_stdin, plain_name
 from dqslam.io.camera import CAMERA_FORMATS
 from dqslam.io.camera.rosbag import KIND as CAMERA_INFO
 from dqslam.io.colmap_model import write_colmap_model
@@ -48,6 +49,8 @@ FROM_BAG = {
     "trajectory": (TRAJECTORIES, "trajectory.txt", "tum"),
     "detections": ((DETECTION_ARRAY,), "boxes.csv", "csv"),
 }
+STDOUT = Path("/dev/stdout")
+FOLDERS = ("yolo", "colmap-model")  #: formats of several files
 # What results are written as.
 FROM_RESULTS = ("g2o", "gtsam", "colmap-model")
 
@@ -86,9 +89,10 @@ def convert(
     Parameters
     ----------
     source, out
-        Files or folders. A bag becomes a folder with camera.json, trajectory.txt and boxes.csv,
-        as far as it has these, unless ``to`` names one format. A directory of results becomes a
-        pose graph, ``to`` g2o or gtsam, or a folder with COLMAP's text model, colmap-model.
+        Files or folders; ``-`` is standard input and standard output. A bag becomes a folder with
+        camera.json, trajectory.txt and boxes.csv, as far as it has these, unless ``to`` names one
+        format. A directory of results becomes a pose graph, ``to`` g2o or gtsam, or a folder with
+        COLMAP's text model, colmap-model.
     format, to
         Names of formats; by default the format of the source is recognized from the file, and
         that of the target from its ending.
@@ -99,6 +103,8 @@ def convert(
     """
     source, out = Path(source), Path(out)
     context = context or ConvertContext()
+    if is_stdin(out):
+        out = _standard_output(to)
     if (source / "map.json").is_file():
         return _convert_results(source, out, to, context)
     if out.exists() and source.exists() and out.samefile(source):
@@ -185,14 +191,25 @@ def _kind(source: Path, format_name: str | None, to: str | None) -> str | None:
     return found
 
 
+def _standard_output(to: str | None) -> Path:
+    """Return the path of standard output, to which one file can be written."""
+    if to is None:
+        raise ValueError("-: standard output has no ending: name a format with --to")
+    if to in FOLDERS:
+        raise ValueError(f"-: {to} is a folder, which standard output cannot be")
+    return STDOUT
+
+
 def _target(out: Path, to: str | None, kind: str) -> Format[Any]:
     if to is not None:
         target = named_format(to, FORMATS[kind], kind)
         if target.write is None:
             raise ValueError(f"--to: {to} is read, not written")
         return target
+    # A packed file without another ending is not taken for a folder.
+    ending = Path(plain_name(out)).suffix.lower() or out.suffix.lower()
     for format_ in FORMATS[kind]:
-        if out.suffix.lower() in format_.endings:
+        if ending in format_.endings:
             return format_
     known = ", ".join(format_.name for format_ in FORMATS[kind] if format_.write)
     raise ValueError(f"{out}: its ending is of no format of {kind}; name one with --to: {known}")
@@ -273,7 +290,7 @@ def _write_detections(
 
 def _beside(out: Path, target: Format[Any], frames: ArrayLike, times: ArrayLike) -> list[Written]:
     """Write the times into a file beside one whose format lacks them."""
-    if "times" not in target.loses:
+    if "times" not in target.loses or out == STDOUT:
         return []
     path = _frames_file(out)
     write_frame_times(path, frames, times)
@@ -282,4 +299,4 @@ def _beside(out: Path, target: Format[Any], frames: ArrayLike, times: ArrayLike)
 
 def _frames_file(out: Path) -> Path:
     """Return the file of the times beside one whose format lacks them."""
-    return out.with_name(f"{out.stem}.frames.csv")
+    return out.with_name(f"{Path(plain_name(out)).stem}.frames.csv")

@@ -11,6 +11,7 @@ import math
 import os
 import shutil
 from collections.abc import Iterator, Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from dqslam._exchange import new_stage, release, remove_stale_stages
 from dqslam._files import FileError as FileError
 from dqslam._files import refuse_inputs as refuse_inputs
 from dqslam._files import write_text as write_text
+from dqslam._input import plain_name
 from dqslam._input import read_text as read_text
 from dqslam._limits import IN_REACH, LARGEST_NUMBER
 
@@ -35,6 +37,21 @@ def read_rows(path: str | Path) -> tuple[list[str], list[int]]:
     if not numbered:
         raise FileError(path, "holds nothing but comments")
     return [line for line, _ in numbered], [number for _, number in numbered]
+
+
+def text_files(folder: Path) -> list[Path]:
+    """Return the files ``*.txt`` and ``*.txt.gz`` of a folder, in the order of their names.
+
+    Raises
+    ------
+    FileError
+        If one is there twice, packed and not.
+    """
+    files = sorted([*folder.glob("*.txt"), *folder.glob("*.txt.gz")], key=plain_name)
+    for one, other in pairwise(files):
+        if plain_name(one) == plain_name(other):
+            raise FileError(folder, f"has both {one.name} and {other.name}")
+    return files
 
 
 def parse_numbers(

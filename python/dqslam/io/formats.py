@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from dqslam._input import exists, is_stream, plain_name, read_head
+from dqslam._input import exists, is_stream, plain_name, read_head, refuse_other_files
 from dqslam.io.files import FileError, read_rows
 from dqslam.io.notes import Notes
 
@@ -102,6 +102,7 @@ def choose_format(
         inner = look.path / "labels"  # as Ultralytics leaves them
         hint = f"; its folder {inner} may be what is meant" if inner.is_dir() else ""
         raise FileError(path, f"cannot be read: Is a directory{hint}")
+    refuse_other_files(path)
     if look.first == "":
         read_rows(path)  # names what is wrong: empty, comments only, or no text
     tried = "; ".join(f"{format_.name}: {format_.looks}" for format_ in formats)

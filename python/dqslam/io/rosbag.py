@@ -92,6 +92,8 @@ def _opened(path: str | Path) -> Iterator[Any]:
         ) from None
     if not Path(path).exists():
         raise FileError(path, "no such file")
+    if Path(path).name.lower().endswith(".gz"):
+        raise FileError(path, "is a packed bag: unpack it first (of packed files, texts are read)")
     check_bag(path)
     try:
         with AnyReader([Path(path)], default_typestore=_typestore()) as bag:

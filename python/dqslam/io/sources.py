@@ -135,7 +135,7 @@ def kind_of(path: str | Path) -> str | None:
     for kind, formats in FORMATS.items():
         if any(guarded(path, one.name, one.recognize, look) for one in formats):
             return kind
-    if look.path.is_file():
+    if not look.path.is_dir():
         read_rows(path)  # its error names the cause: empty, comments only, or no text
     known = ", ".join(dict.fromkeys(name for names in KINDS.values() for name in names))
     raise FileError(path, f"is in no known format; name it with --format: {known}")

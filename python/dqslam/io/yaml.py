@@ -30,7 +30,18 @@ def parse_yaml(path: str | Path, text: str) -> dict[str, Any]:
         raise FileError(path, f"has more than {MOST_CHARACTERS} characters")
 
     class Loader(yaml.SafeLoader):  # type: ignore[misc]
-        """Plain data, and OpenCV's tags."""
+        """Plain data, and OpenCV's tags; a key may be repeated but has one value."""
+
+        def construct_mapping(self, node: Any, deep: bool = False) -> Any:
+            before: dict[Any, Any] = {}
+            for key, value in node.value if isinstance(node, yaml.MappingNode) else ():
+                if not isinstance(key, yaml.ScalarNode):
+                    continue
+                if before.setdefault(key.value, value.value) != value.value:
+                    line = key.start_mark.line + 1
+                    message = f"{str(key.value)[:40]} is there twice, with different values"
+                    raise FileError(path, message, line)
+            return super().construct_mapping(node, deep=deep)
 
     Loader.add_multi_constructor(
         _OPENCV_TAGS, lambda loader, _, node: loader.construct_mapping(node, deep=True)

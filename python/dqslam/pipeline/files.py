@@ -8,17 +8,22 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from dqslam import _core, io
+from dqslam._checks import Floats
 from dqslam._files import write_text
 from dqslam._outputs import output_set
 from dqslam.association import FINAL
-from dqslam.inspection import FATAL, first_findings
+from dqslam.inspection import FATAL, find_jumps, first_findings
 from dqslam.io.results import GRAPH_FILE, write_graph
 from dqslam.io.results.save import write_estimate
 from dqslam.pipeline.conclude import RunResult
+from dqslam.pipeline.jumps import doubt_jumps
 from dqslam.pipeline.options import Progress, RunFilesOptions
 from dqslam.pipeline.problem import kept_options
 from dqslam.pipeline.recording import run
+from dqslam.places.landmarks import landmarks_of
 from dqslam.recording import Recording
 from dqslam.simulation import perturb_odometry
 
@@ -124,7 +129,7 @@ def _run(
     notes = io.Notes(max_bad=options.reading.max_bad)
     doubts: list[str] = []
     remarks: list[str] = []
-    recording, dropped = _load(files, options, notes, doubts, remarks)
+    recording, dropped, jumps = _load(files, options, notes, doubts, remarks)
     result = run(
         recording,
         replace(options, estimates_noise=options.estimates_noise or not says_noise),
@@ -132,6 +137,8 @@ def _run(
         reference=reference,
         progress=progress,
     )
+    estimate = result.estimate
+    doubts += doubt_jumps(landmarks_of(estimate), result.detections, estimate.timestamps, jumps)
     report = {
         "camera": str(camera),
         "odometry": str(odometry),
@@ -163,17 +170,22 @@ def _load(
     notes: io.Notes,
     doubts: list[str],
     remarks: list[str],
-) -> tuple[Recording, io.Dropped]:
+) -> tuple[Recording, io.Dropped, Floats]:
     """Read a recording, add noise to it if need be, and count the boxes that were left out.
+
+    The last are the times before jumps of the odometry, (j,) s.
 
     What readers left out is added to ``notes``, what speaks against the files to ``doubts``, or
     refused, and what may to ``remarks``.
     """
+    jumps: list[float] = []
 
     def examine(camera: _core.Camera, trajectory: io.Trajectory, table: io.DetectionTable) -> None:
         found, noted = _examine(camera, trajectory, table, options)
         doubts.extend(found)
         remarks.extend(noted)
+        odd = find_jumps(trajectory)
+        jumps.extend(trajectory.timestamps[:-1][odd.jumps | odd.gaps].tolist())
 
     recording, dropped = io.load_recording(
         *files,
@@ -193,7 +205,7 @@ def _load(
         noisy = perturb_odometry(recording, options.added_noise, seed=options.seed).odometry
         noisy = replace(noisy, covariance=recording.odometry.covariance)
         recording = replace(recording, odometry=noisy)
-    return recording, dropped
+    return recording, dropped, np.array(jumps)
 
 
 def _examine(

@@ -8,6 +8,7 @@ import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -91,7 +92,7 @@ def read_json_table(path: str | Path) -> Table:
     """Read a JSON file that holds a table."""
     text = read_text(path)
     try:
-        content: Any = json.loads(text)
+        content: Any = json.loads(text, object_pairs_hook=partial(_agreed, path))
     except json.JSONDecodeError as error:
         raise FileError(path, f"not JSON: {error.msg}", error.lineno) from None
     except ValueError as error:  # a number of thousands of digits
@@ -99,6 +100,16 @@ def read_json_table(path: str | Path) -> Table:
     except RecursionError:
         raise FileError(path, "nested too deeply") from None
     return Table(path, text, _table(path, content))
+
+
+def _agreed(path: str | Path, pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return a table of JSON, in which a key may be repeated but has one value."""
+    table: dict[str, Any] = {}
+    for key, value in pairs:
+        if key in table and table[key] != value:
+            raise FileError(path, f"{key} is there twice, with different values")
+        table[key] = value
+    return table
 
 
 def read_toml_table(path: str | Path) -> Table:

@@ -14,9 +14,17 @@ from pathlib import Path
 
 import numpy as np
 
+from dqslam._input import plain_name, read_head
 from dqslam.io.detections.records import NO_TIMES, Records, make_table
 from dqslam.io.detections.table import DetectionTable
-from dqslam.io.files import FileError, parse_floats, parse_integers, read_rows
+from dqslam.io.files import (
+    FileError,
+    parse_floats,
+    parse_integers,
+    read_rows,
+    read_text,
+    text_files,
+)
 from dqslam.io.formats import Format, Look, ReadContext
 
 TRACKING = ("frame", "id", "class")
@@ -43,10 +51,10 @@ def read_objects(path: str | Path, context: ReadContext) -> DetectionTable:
     cells: list[list[str]] = []
     lines: list[int] = []
     files: list[Path] = []
-    all_files = sorted(Path(path).glob("*.txt"))
+    all_files = text_files(Path(path))
     for done, file in enumerate(all_files, start=1):
         context.progress(done / len(all_files))
-        if not file.read_bytes().strip():
+        if not read_text(file, may_be_blank=True).strip():
             continue  # an image without objects
         for row, line in zip(*read_rows(file), strict=True):
             fields = row.split()
@@ -100,10 +108,8 @@ def _table(
             if files is None
             else None
         ),
-        image=None if files is None else [Path(file).name for file in own],
-        all_images=()
-        if files is None
-        else [file.name for file in sorted(Path(path).glob("*.txt"))],
+        image=None if files is None else [plain_name(file) for file in own],
+        all_images=() if files is None else [plain_name(file) for file in text_files(Path(path))],
         score=np.array(numbers("score", SCORE)) if scored else None,
         class_name=[row[CLASS] for row in rows],
         track_id=[row[1] for row in rows] if files is None else None,
@@ -131,9 +137,8 @@ def _looks_like_tracking(look: Look) -> bool:
 def _looks_like_objects(look: Look) -> bool:
     if not look.path.is_dir():
         return False
-    for file in sorted(look.path.glob("*.txt")):
-        with file.open(encoding="utf-8", errors="replace") as lines:
-            first = next((line for line in lines if line.strip()), None)
+    for file in text_files(look.path):
+        first = next((line for line in read_head(file).split("\n") if line.strip()), None)
         if first is not None:
             return _is_label(first.split())
     return False

@@ -20,10 +20,11 @@ from pathlib import Path
 
 import numpy as np
 
+from dqslam._input import plain_name
 from dqslam.io.detections.records import Records, make_table
 from dqslam.io.detections.table import DetectionTable
 from dqslam.io.detections.yolo_lines import YoloLine, split_lines
-from dqslam.io.files import FileError, read_text, whole_folder, write_text
+from dqslam.io.files import FileError, read_text, text_files, whole_folder, write_text
 from dqslam.io.formats import Format, Look, ReadContext
 from dqslam.io.frames import frame_table, read_frame_times
 from dqslam.io.image_names import have_times
@@ -54,8 +55,8 @@ def read_yolo(path: str | Path, context: ReadContext) -> DetectionTable:
         columns=FIELDS,
         line=[line.number for line in lines],
         box=boxes.share * np.tile(size, 2) - CORNER,
-        image=[line.file.name for line in lines],
-        all_images=[file.name for file in _box_files(folder)],
+        image=[plain_name(line.file) for line in lines],
+        all_images=[plain_name(file) for file in _box_files(folder)],
         score=boxes.score,
         class_id=[line.cells[0] for line in lines],
         class_names={str(number): name for number, name in _names(folder).items()},
@@ -85,6 +86,8 @@ def write_yolo(
     content[CLASSES] = [names.get(i, str(i)) + "\n" for i in range(max(names) + 1)]
     if times:
         content[TIMES] = frame_table(table.frame, table.timestamp)
+    if Path(path).suffix.lower() == ".gz":
+        raise FileError(path, "yolo is a folder of files, which is not packed")
     with whole_folder(path) as folder:
         for name, lines in content.items():
             write_text(folder / name, lines)
@@ -96,12 +99,7 @@ def _lines(folder: Path, context: ReadContext) -> list[YoloLine]:
     files = _box_files(folder)
     for done, file in enumerate(files, start=1):
         context.progress(done / len(files))
-        if file.stat().st_size == 0:
-            continue
-        try:
-            text = file.read_text(encoding="utf-8-sig")
-        except UnicodeDecodeError:
-            raise FileError(file, "is not a text file (UTF-8)") from None
+        text = read_text(file, may_be_blank=True)
         lines += [
             YoloLine(file, number, tuple(row.split()))
             for number, row in enumerate(text.split("\n"), start=1)
@@ -111,7 +109,7 @@ def _lines(folder: Path, context: ReadContext) -> list[YoloLine]:
 
 
 def _box_files(folder: Path) -> list[Path]:
-    return sorted(file for file in folder.glob("*.txt") if file.name != CLASSES)
+    return [file for file in text_files(folder) if plain_name(file) != CLASSES]
 
 
 def _names(folder: Path) -> dict[int, str]:
@@ -138,7 +136,7 @@ def _looks(look: Look) -> bool:
 
 
 def _has_times(path: Path) -> bool:
-    return (path / TIMES).is_file() or have_times([file.name for file in _box_files(path)])
+    return (path / TIMES).is_file() or have_times([plain_name(file) for file in _box_files(path)])
 
 
 YOLO = Format(
