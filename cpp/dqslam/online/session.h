@@ -73,7 +73,7 @@ class Session {
   virtual int num_objects() const = 0;
   virtual Eigen::VectorXd PoseAt(int row) const = 0;
   virtual RowMatrix LastCovariance() const = 0;  ///< of the last pose in its tangent, (k, k)
-  virtual RowMatrix Poses() const = 0;                           ///< (poses, d)
+  virtual RowMatrix Poses() const = 0;           ///< (poses, d)
   virtual RowMatrix PosesAt(const IndexVector& rows) const = 0;  ///< (n, d)
   virtual RowMatrix Ellipsoids() const = 0;      ///< (objects, 9) log-Cholesky parameters
   virtual IndexVector Observations() const = 0;  ///< number of boxes of each object
