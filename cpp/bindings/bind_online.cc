@@ -98,7 +98,9 @@ void BindReport(py::module_& m) {
       .def_readonly("closed_loop", &StepReport::closed_loop, "A loop that did not fit was solved.")
       .def_readonly("recovered",
                     &StepReport::recovered,
-                    "The last poses and their young objects were started again.");
+                    "The last poses and their young objects were started again.")
+      .def_readwrite(
+          "covariance", &StepReport::covariance, "Of the new pose, in its tangent, (k, k).");
 }
 
 void BindObservations(py::module_& m) {
@@ -205,6 +207,8 @@ void BindSession(py::module_& m) {
       .def_property_readonly("num_objects", &Session::num_objects)
       .def("pose_at", &Session::PoseAt, "row"_a, "Shape (d,).")
       .def("poses_at", &Session::PosesAt, "rows"_a, "Shape (n, d).")
+      .def_property_readonly(
+          "last_covariance", &Session::LastCovariance, "Of the last pose, in its tangent, (k, k).")
       .def_property_readonly("poses", &Session::Poses, "Shape (n, d).")
       .def_property_readonly("ellipsoids", &Session::Ellipsoids, "Shape (o, 9).")
       .def_property_readonly("observations", &Session::Observations, "Boxes per object, (o,).");

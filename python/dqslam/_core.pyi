@@ -1153,6 +1153,15 @@ class StepReport:
         A loop that did not fit was solved.
         """
     @property
+    def covariance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Of the new pose, in its tangent, (k, k).
+        """
+    @covariance.setter
+    def covariance(
+        self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"]
+    ) -> None: ...
+    @property
     def first_observation(self) -> int:
         """
         Row of its first observation: boxes as they were given, then positions.
@@ -1306,6 +1315,11 @@ class Session:
     def ellipsoids(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
         """
         Shape (o, 9).
+        """
+    @property
+    def last_covariance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Of the last pose, in its tangent, (k, k).
         """
     @property
     def num_objects(self) -> int: ...

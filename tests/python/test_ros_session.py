@@ -16,7 +16,7 @@ from ros_messages import (
     robot_path,
 )
 
-from dqslam_ros.poses import PoseBuffer, matrix_of, pose_of  # isort: skip
+from dqslam_ros.poses import PoseBuffer, covariance_in_map, matrix_of, pose_of  # isort: skip
 from dqslam_ros.session import Session  # isort: skip
 
 
@@ -120,3 +120,29 @@ def test_the_package_is_of_this_version():
     used = set(re.findall(r"^from (\w+)(?:\.\w+)? import", source, flags=re.MULTILINE))
     ours = {*sys.stdlib_module_names, "dqslam", "dqslam_ros", "rclpy"}
     assert used - ours <= needed
+
+
+def test_the_covariance_is_about_the_axes_of_the_map():
+    """A small turn of the camera about its own x axis, beside the robot, in a map turned by 90°."""
+    half = np.sqrt(0.5)
+    map_from_base = matrix_of([5, 5, 0, 0, 0, half, half])  # x of the robot is y of the map
+    base_from_camera = matrix_of([0, 2, 0, 0, 0, 0, 1])
+    of_camera = np.diag([0, 0, 0, 0.01, 0, 0])
+    found = covariance_in_map(of_camera, map_from_base, base_from_camera)
+    # The robot, 2 m beside that axis, moves by 2 m a radian along z, and turns about y of the map.
+    expected = np.zeros((6, 6))
+    expected[2, 2], expected[4, 4] = 4 * 0.01, 0.01
+    expected[2, 4] = expected[4, 2] = -2 * 0.01
+    np.testing.assert_allclose(found, expected, atol=1e-12)
+
+
+def test_the_pose_has_a_covariance(orbit):
+    session, true = ready(), robot_path(orbit)
+    assert session.covariance_in_map() is None
+    for pose in range(30):
+        session.take_odometry(odometry(orbit.times[pose], true[pose]))
+        session.take_detections(detections(orbit, pose))
+        session.step()
+    found = session.covariance_in_map()
+    np.testing.assert_allclose(found, found.T, atol=1e-15)
+    assert np.linalg.eigvalsh(found).min() > 0

@@ -1,12 +1,18 @@
 """A session as MCAP while it runs, read back by another library."""
 
+import contextlib
+import json
+import socket
+import struct
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import dqslam as dq
 from dqslam.cli import main
 from dqslam.io import load_results
-from dqslam.view import record_session
+from dqslam.view import record_session, serve_session
 from orbit import make_orbit, write_orbit
 from test_view_foxglove import read, vector
 
@@ -85,3 +91,71 @@ def test_a_file_in_the_folder_of_the_results_is_refused(files, tmp_path, capsys)
 def test_a_file_that_cannot_be_written_is_said(tmp_path):
     with pytest.raises(dq.io.FileError, match="cannot be written"), record_session(tmp_path):
         pass
+
+
+def test_each_step_goes_over_a_websocket_while_the_session_runs():
+    """Another program gets the pose of a step before the next step is taken."""
+    client = pytest.importorskip("websockets.sync.client", reason="websockets comes with viser")
+    recording, _ = dq.simulate(dq.load_scenario("paper"), seed=0)
+    slam, steps = dq.OnlineSlam(recording.camera), list(dq.steps_of(recording))
+    with (
+        serve_session("a drive", "127.0.0.1", 0) as (address, show),
+        client.connect(address, subprotocols=["foxglove.sdk.v1"]) as connection,
+    ):
+        ids = {}
+        while "/pose" not in ids:
+            message = connection.recv(timeout=30)
+            if isinstance(message, str) and json.loads(message)["op"] == "advertise":
+                ids |= {one["topic"]: one["id"] for one in json.loads(message)["channels"]}
+        wanted = {"op": "subscribe", "subscriptions": [{"id": 7, "channelId": ids["/pose"]}]}
+        connection.send(json.dumps(wanted))
+        for step in steps[:20]:
+            slam.add(step.odometry, step.boxes, timestamp=step.timestamp)
+            received = None
+            while received is None:  # until the server has taken the subscription
+                show(slam, step)
+                with contextlib.suppress(TimeoutError):
+                    while not isinstance(received := connection.recv(timeout=1), bytes):
+                        received = None
+            # A message: 1, the subscription, the time in ns, and the pose as protobuf.
+            kind, subscription, at = struct.unpack_from("<BIQ", received)
+            assert (kind, subscription, at) == (1, 7, round(1e9 * step.timestamp))
+            assert struct.pack("<d", slam.pose[0]) in received or slam.pose[0] == 0.0
+
+
+def test_a_port_that_is_taken_is_an_error():
+    with (
+        serve_session("first", "127.0.0.1", 0) as (address, _),
+        pytest.raises(ValueError, match="cannot be served"),
+        serve_session("second", "127.0.0.1", int(address.rsplit(":", 1)[1])),
+    ):
+        pass
+
+
+def test_the_command_shows_a_session_in_the_time_of_the_recording(
+    files, tmp_path, free_port, monkeypatch
+):
+    """24 images, 0.1 s apart, by a clock that goes on only while the command waits."""
+    clock = [50.0]
+
+    def wait(seconds):
+        clock[0] += seconds
+
+    monkeypatch.setattr(
+        "dqslam.view.session.time", SimpleNamespace(monotonic=lambda: clock[0], sleep=wait)
+    )
+    assert main(command(files, tmp_path, "--foxglove", "--port", str(free_port))) == 0
+    assert clock[0] == pytest.approx(50.0 + 2.3, abs=1e-6)
+
+
+def test_the_websocket_is_for_sessions(files, tmp_path, capsys):
+    words = [one for one in command(files, tmp_path, "--foxglove") if one != "--online"]
+    assert main(words) == 2
+    assert "--foxglove: needs --online" in capsys.readouterr().err
+
+
+@pytest.fixture
+def free_port():
+    with socket.socket() as one:
+        one.bind(("127.0.0.1", 0))
+        return one.getsockname()[1]

@@ -87,7 +87,7 @@ WindowResult LoopClosing<Pose>::Minimize(int begin, int window_begin) {
   double damping = kFirstDamping;
   const WindowResult result =
       window_.Minimize(begin, MarginalPriors::kRelinearize, options_.loop_iterations, &damping);
-  if (result.undefined == 0 && result.misfits.empty()) return result;
+  if (IsClosed(result)) return result;
   before.Restore(&history_);
   history_.DeadReckon(window_begin);
   for (const int object : history_.ObjectsSeenFrom(window_begin)) {

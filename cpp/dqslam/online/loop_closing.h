@@ -41,6 +41,11 @@ class LoopClosing {
   /// their odometry.
   WindowResult Minimize(int begin, int window_begin);
 
+  /// Whether Minimize() has kept its result.
+  static bool IsClosed(const WindowResult& result) {
+    return result.undefined == 0 && result.misfits.empty();
+  }
+
   /// Tries to close a loop with deferred observations, if such an attempt is due.  Returns nothing
   /// if none was made or if it failed, and then the history is unchanged.
   std::optional<WindowResult> Realign();

@@ -9,6 +9,7 @@
 #include "dqslam/online/checked.h"
 #include "dqslam/online/initialize_object.h"
 #include "dqslam/online/loop_closing.h"
+#include "dqslam/online/pose_covariances.h"
 #include "dqslam/online/relabel.h"
 #include "dqslam/online/schedule.h"
 #include "dqslam/online/window.h"
@@ -64,13 +65,16 @@ class SessionOf : public Session {
     history_.steps.push_back(step);
     history_.poses.push_back(step.relative);
     history_.DeadReckon(pose);
+    covariances_.DeadReckon(history_, pose);
     for (Eigen::Index row = 0; row < given.log_size_mean.size(); ++row) {
       history_.objects.emplace_back();
       history_.objects.back().size = {given.log_size_mean[row], given.log_size_sigma[row]};
     }
     if (pose > 0) loops_.Drift();
     for (const Observation& observation : observations) Observe(observation);
-    return Update();
+    StepReport report = Update();
+    report.covariance = LastCovariance();
+    return report;
   }
 
   void AddMapObject(const Vector9d& ellipsoid,
@@ -83,6 +87,7 @@ class SessionOf : public Session {
     const Model& model = history_.model;
     auto copy = std::make_unique<SessionOf>(model.camera, model.scene, options_);
     copy->history_ = history_;
+    copy->covariances_ = covariances_;
     copy->damping_ = damping_;
     copy->schedule_ = schedule_;
     copy->loops_.set_progress(loops_.progress());
@@ -122,7 +127,10 @@ class SessionOf : public Session {
       throw std::invalid_argument("begin: there is no pose " + std::to_string(begin));
     }
     double damping = kFirstDamping;
-    return window_.Minimize(begin, MarginalPriors::kRelinearize, iterations, &damping).cost;
+    const WindowResult result =
+        window_.Minimize(begin, MarginalPriors::kRelinearize, iterations, &damping);
+    if (result.poses > 0) TakeSmoothing();
+    return result.cost;
   }
 
   void Merge(const RowMatrix& poses, const RowMatrix& ellipsoids) override {
@@ -135,6 +143,11 @@ class SessionOf : public Session {
   int num_objects() const override { return history_.num_objects(); }
 
   Eigen::VectorXd PoseAt(int row) const override { return history_.poses.at(row); }
+
+  RowMatrix LastCovariance() const override {
+    if (num_poses() == 0) throw std::out_of_range("there is no pose yet");
+    return covariances_.last();
+  }
 
   RowMatrix Poses() const override {
     return PosesAt(IndexVector::LinSpaced(num_poses(), 0, num_poses() - 1));
@@ -208,12 +221,16 @@ class SessionOf : public Session {
     damping_ = std::min(damping_, kMostDamping);
     const WindowResult window =
         window_.Minimize(begin, MarginalPriors::kKeep, options_.window_iterations, &damping_);
+    if (const auto conditional = window_.CovarianceOfLastPose()) {
+      covariances_.TakeWindow(history_, begin, *conditional);
+    }
     report.window_poses = window.poses;
     report.window_objects = window.objects;
     report.linearized = window.linearized;
     report.undefined = window.undefined;
     report.chi_square = window.residuals > 0 ? window.chi_square / window.residuals : 0;
     if (const auto closed = loops_.Realign()) {
+      TakeSmoothing();
       report.closed_loop = true;
       report.smoothed_poses = closed->poses;
       report.smoothed_observations = closed->linearized;
@@ -225,6 +242,12 @@ class SessionOf : public Session {
     report.closed_loop = smoothing.closes_loop;
     if (smoothing.begin < begin) SmoothBeyond(begin, smoothing, &report);
     return report;
+  }
+
+  void TakeSmoothing() {
+    if (const auto conditional = window_.CovarianceOfLastPose()) {
+      covariances_.TakeSmoothing(history_, window_.begin(), *conditional);
+    }
   }
 
   // The first pose that is free among so many last ones.
@@ -245,7 +268,7 @@ class SessionOf : public Session {
     int begin = std::max(smoothing.begin, FirstOfLast(num_poses()));
     if (smoothing.closes_loop) begin = std::min(loops_.Begin(begin), window_begin);
     double damping = kFirstDamping;
-    bool has_changed = true;
+    bool has_changed = true, is_kept = true;
     for (int round = 0; round < smoothing.rounds && has_changed; ++round) {
       const WindowResult result =
           round == 0 && smoothing.closes_loop
@@ -254,6 +277,7 @@ class SessionOf : public Session {
                     begin, MarginalPriors::kRelinearize, smoothing.iterations, &damping);
       report->smoothed_poses = result.poses;
       report->smoothed_observations += result.linearized;
+      is_kept = round > 0 || !smoothing.closes_loop || LoopClosing<Pose>::IsClosed(result);
       has_changed = false;
       for (const int row : result.misfits) {
         Object& object = history_.objects[row];
@@ -263,6 +287,11 @@ class SessionOf : public Session {
         has_changed = has_changed || object.center_shape != before;
       }
     }
+    if (is_kept) {
+      TakeSmoothing();
+    } else {
+      covariances_.DeadReckon(history_, window_begin);
+    }
   }
 
   OnlineOptions options_;
@@ -270,6 +299,7 @@ class SessionOf : public Session {
   Window<Pose> window_;
   LoopClosing<Pose> loops_;
   Schedule schedule_;
+  PoseCovariances<Pose> covariances_;
   double damping_ = kFirstDamping;  // of the window
 };
 

@@ -26,6 +26,7 @@ struct StepReport {
   int smoothed_observations = 0;  ///< number of observations that it linearized
   bool closed_loop = false;       ///< whether a loop that did not fit was solved
   bool recovered = false;  ///< whether the last poses and their young objects were reinitialized
+  RowMatrix covariance;    ///< of the new pose in its tangent, (k, k)
 };
 
 class Session {
@@ -71,7 +72,8 @@ class Session {
   virtual int num_poses() const = 0;
   virtual int num_objects() const = 0;
   virtual Eigen::VectorXd PoseAt(int row) const = 0;
-  virtual RowMatrix Poses() const = 0;                           ///< (poses, d)
+  virtual RowMatrix LastCovariance() const = 0;  ///< of the last pose in its tangent, (k, k)
+  virtual RowMatrix Poses() const = 0;           ///< (poses, d)
   virtual RowMatrix PosesAt(const IndexVector& rows) const = 0;  ///< (n, d)
   virtual RowMatrix Ellipsoids() const = 0;      ///< (objects, 9) log-Cholesky parameters
   virtual IndexVector Observations() const = 0;  ///< number of boxes of each object

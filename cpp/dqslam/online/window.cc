@@ -267,6 +267,23 @@ void Window<Pose>::TakeTrial() {
   std::swap(here_, there_);
 }
 
+template <typename Pose>
+std::optional<typename History<Pose>::Square> Window<Pose>::CovarianceOfLastPose() {
+  if (!system_ || begin_ >= end_) return std::nullopt;
+  const BlockMatrix& H = system_->equations.H;
+  // Without the damping of the last step, which would hide how little is known.
+  if (!system_->cholesky.Factorize(H, Eigen::VectorXd::Zero(H.rows()))) return std::nullopt;
+  const int offset = k * (end_ - begin_ - 1);
+  typename History<Pose>::Square covariance;
+  for (int axis = 0; axis < k; ++axis) {
+    const Eigen::VectorXd column =
+        system_->cholesky.Solve(Eigen::VectorXd::Unit(H.rows(), offset + axis));
+    covariance.col(axis) = column.segment<k>(offset);
+  }
+  if (!covariance.allFinite()) return std::nullopt;
+  return 0.5 * (covariance + covariance.transpose());
+}
+
 template class Window<Se2>;
 template class Window<Se3>;
 

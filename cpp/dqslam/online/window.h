@@ -52,6 +52,13 @@ class Window {
   /// reinitialize.cc.
   WindowResult Reinitialize(int begin, int iterations);
 
+  /// The first pose of the last minimization.
+  int begin() const { return begin_; }
+
+  /// The covariance of the last pose in its tangent, by the last linearization and with all poses
+  /// before the window constant.  Returns nothing if the window does not determine it.
+  std::optional<typename History<Pose>::Square> CovarianceOfLastPose();
+
  private:
   static constexpr int k = Pose::kTangentSize;
   using Storage = typename History<Pose>::Storage;

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from dqslam.studies.batch import AlignOptions, MergeOptions, Task
 
 # The batch chooses where results are. A bag is camera, odometry and boxes in one file.
-_CHOSEN = ("out", "mcap")
+_CHOSEN = ("out", "mcap", "foxglove", "host", "port")
 _IN_BAG = ("camera", "odometry", "detections")
 _PLACES = ("folder", "bag", "name")
 

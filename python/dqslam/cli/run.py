@@ -22,6 +22,8 @@ from dqslam.cli.settings import CONFIG, ConfigFile, settings_text
 if TYPE_CHECKING:
     from dqslam._core import Shape
     from dqslam.assumptions import ClassShapes, OdometryNoise
+    from dqslam.online import OnlineSlam, Step
+    from dqslam.view.session import SessionRecorder
 
 DOUBTFUL = 3  # exit code of a run whose result is doubtful
 NOISE = "translation=0.02, rotation=0.01"
@@ -161,6 +163,20 @@ def run(
             "it runs.",
         ),
     ] = None,
+    foxglove: Annotated[
+        bool,
+        typer.Option(
+            "--foxglove",
+            help="With --online, show each step over a websocket, for Foxglove or Lichtblick, in "
+            "the time that the recording took.",
+        ),
+    ] = False,
+    host: Annotated[
+        str, typer.Option(help="Address of the websocket; 0.0.0.0 lets other machines connect.")
+    ] = "127.0.0.1",
+    port: Annotated[
+        int, typer.Option(min=1, max=65535, help="Port of the websocket of --foxglove.")
+    ] = 8765,
     force: Annotated[
         bool,
         typer.Option("--force", help="Go on if poses and boxes do not fit together."),
@@ -179,7 +195,7 @@ def run(
     from dqslam.assumptions import load_placements, load_size_priors
     from dqslam.pipeline import RunFilesOptions, run_files
     from dqslam.pipeline.files import WRITTEN_BY
-    from dqslam.view import build_scene, record_session, write_mcap
+    from dqslam.view import build_scene, record_session, serve_session, write_mcap
 
     inputs = (
         *(*files.files, groundtruth, size_priors, odometry_covariance),
@@ -214,9 +230,11 @@ def run(
         odometry_covariance=odometry_covariance,
     )
     output = Output(quiet=quiet, as_json=json)
+    if foxglove and not online:
+        raise ValueError("--foxglove: needs --online (dqslam view --foxglove plays results)")
+    if (mcap is not None or foxglove) and find_spec("foxglove") is None:
+        raise ValueError("MCAP needs foxglove-sdk: pip install 'dqslam[mcap]'")
     if mcap is not None:
-        if find_spec("foxglove") is None:
-            raise ValueError("MCAP needs foxglove-sdk: pip install 'dqslam[mcap]'")
         refuse_inputs(mcap, inputs)
         if online and out.resolve() in mcap.resolve().parents:
             raise ValueError(
@@ -227,23 +245,31 @@ def run(
     shown: AbstractContextManager[Callable[[Any], None]] = (
         output.live("loading") if online else output.share("estimating")
     )
-    with shown as show, ExitStack() as stack:
-        recorder = None
+    with ExitStack() as stack:
+        recorders = []
         if mcap is not None and online:
-            recorder = stack.enter_context(record_session(mcap))
+            recorders.append(stack.enter_context(record_session(mcap)))
+        if foxglove:
+            served = serve_session(out.name, host, port, in_real_time=True)
+            address, recorder = stack.enter_context(served)
+            recorders.append(recorder)
+            output.line(f"{address} shows the session, for Foxglove")
+        show = stack.enter_context(shown)
         result = run_files(
             files.camera,
             files.odometry,
             files.detections,
-            replace(options, watch=recorder),
+            replace(options, watch=_all_of(recorders)),
             online=online,
             groundtruth=groundtruth,
             out=out,
             beside={CONFIG: settings_text(context)},
             progress=lambda share, text: show(text if online else share),
         )
-        if recorder is not None:
-            recorder.finish(build_scene(io.load_results(out)))
+        if recorders:
+            result_scene = build_scene(io.load_results(out))
+            for recorder in recorders:
+                recorder.finish(result_scene)
     output.document(result.report)
     show_report(output, result.report)
     output.line(f"wrote {out}")
@@ -253,6 +279,18 @@ def run(
         output.line(f"wrote {mcap}")
     if result.report["doubts"]:
         raise typer.Exit(DOUBTFUL)
+
+
+def _all_of(recorders: "list[SessionRecorder]") -> "Callable[[OnlineSlam, Step], None] | None":
+    """Return what gives a step to each recorder; None without any."""
+    if not recorders:
+        return None
+
+    def watch(slam: "OnlineSlam", step: "Step") -> None:
+        for recorder in recorders:
+            recorder(slam, step)
+
+    return watch
 
 
 def parse_shapes(given: str) -> "Shape | ClassShapes":

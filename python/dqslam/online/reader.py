@@ -15,6 +15,7 @@ from dqslam.online.locked import locked
 from dqslam.online.objects import Objects
 from dqslam.online.readout import read_assignments, read_estimate, read_objects
 from dqslam.online.state import State
+from dqslam.recording import tangent_size
 
 
 class SessionReader:
@@ -48,6 +49,20 @@ class SessionReader:
         if not len(self):
             return self._state.begin[0]
         return np.asarray(self._state.core.pose_at(len(self) - 1))
+
+    @property
+    @locked
+    def pose_covariance(self) -> Floats:
+        """Covariance of ``pose``, shape (k, k), translation [m] before rotation [rad].
+
+        It is in the frame of the pose, as ``Marginals.poses`` is. Before any step, it is that of
+        the first pose, and zero if that is exact.
+        """
+        if len(self):
+            return self._state.core.last_covariance
+        k = tangent_size(self.pose_model)
+        given = self._state.begin[1]
+        return given.copy() if given.size else np.zeros((k, k))
 
     @property
     @locked

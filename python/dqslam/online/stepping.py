@@ -146,6 +146,7 @@ def _take_step(
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             found = identifier.identify(step.boxes, waiting[single], observation_rows)
         object_rows[waiting[single]] = found
+        report.covariance = state.core.last_covariance  # a keyframe may have moved the pose
         shown = object_rows.copy()
         shown[waiting] = object_rows[waiting[counts]]
         state.shown = np.array([*registry.ids, -1], dtype=np.int64)[shown]

@@ -118,8 +118,10 @@ def _change(entry: dict[str, Any]) -> Change:
         significance=None if significance is None else float(significance),
         size=float(size),
         looks=float(entry["looks"]),
-        **ids,
-        **arrays,
+        first_id=ids["first_id"],
+        second_id=ids["second_id"],
+        first_center=arrays["first_center"],
+        second_center=arrays["second_center"],
     )
 
 

@@ -1,9 +1,10 @@
-"""A session as MCAP while it runs: the map, the path and the pose that it had at each step."""
+"""A session while it runs, as MCAP or over a websocket: map, path and pose of each step."""
 
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -27,8 +28,10 @@ _UP = np.array([0.0, 0.0, 1.0])
 class SessionRecorder:
     """Writes each step of a session as it is taken."""
 
-    def __init__(self, channels: Channels, title: str) -> None:
-        self._channels, self._title = channels, title
+    def __init__(
+        self, channels: Channels, title: str, *, wait: Callable[[float], None] | None = None
+    ) -> None:
+        self._channels, self._title, self._wait = channels, title, wait
         self._last: float | None = None
 
     def __call__(self, slam: OnlineSlam, step: Step) -> None:
@@ -40,6 +43,8 @@ class SessionRecorder:
             If the time of the step is none that MCAP has.
         """
         check_times(np.array([step.timestamp]))
+        if self._wait is not None:
+            self._wait(step.timestamp)
         pose = _core.world_from_camera(slam.pose_model, slam.camera, slam.pose[None])
         self._channels.log_frame(self._scene(slam, step, pose), 0)
         if self._last is None or step.timestamp - self._last >= WORLD_S:
@@ -130,3 +135,47 @@ def record_session(path: str | Path) -> Iterator[SessionRecorder]:
         raise FileError(path, f"cannot be written: {error.strerror or error}") from None
     with opened:
         yield SessionRecorder(Channels(context), Path(path).stem)
+
+
+@contextlib.contextmanager
+def serve_session(
+    title: str, host: str, port: int, *, in_real_time: bool = False
+) -> Iterator[tuple[str, SessionRecorder]]:
+    """Serve a session that begins over a websocket that Foxglove opens; needs ``dqslam[mcap]``.
+
+    Gives the address, and the recorder that each step is given to. In real time, the recorder
+    waits until as much time has passed since the first step as between the times of the steps.
+
+    Raises
+    ------
+    ValueError
+        If the port is taken, or the address is none of this machine.
+    """
+    foxglove = foxglove_sdk()
+    context = foxglove.Context()
+    try:
+        server = foxglove.start_server(name=title, host=host, port=port, context=context)
+    except RuntimeError as error:
+        raise ValueError(f"{host}:{port} cannot be served: {error}") from None
+    recorder = SessionRecorder(Channels(context), title, wait=_RealTime() if in_real_time else None)
+    try:
+        yield f"ws://{host}:{server.port}", recorder
+    finally:
+        server.stop()
+
+
+class _RealTime:
+    """Waits until a step is due, by its time and that of the first one.
+
+    It begins again with a step that is not later than the one before, as in a second replay.
+    """
+
+    def __init__(self) -> None:
+        self._begin = 0.0  # by the clock, where time 0 of the steps would be
+        self._last = np.inf
+
+    def __call__(self, timestamp: float) -> None:
+        if timestamp <= self._last:
+            self._begin = time.monotonic() - timestamp
+        self._last = timestamp
+        time.sleep(max(0.0, timestamp - (time.monotonic() - self._begin)))

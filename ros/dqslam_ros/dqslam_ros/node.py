@@ -6,7 +6,15 @@ from collections.abc import Callable
 from dataclasses import fields
 
 import rclpy
-from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, TransformStamped, Vector3
+from geometry_msgs.msg import (
+    Point,
+    Pose,
+    PoseStamped,
+    PoseWithCovarianceStamped,
+    Quaternion,
+    TransformStamped,
+    Vector3,
+)
 from nav_msgs.msg import Odometry, Path
 from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
@@ -46,7 +54,7 @@ class DqslamNode(Node):
         self.broadcaster = TransformBroadcaster(self)
         self.markers = self.create_publisher(MarkerArray, "objects", 1)
         self.boxes = self.create_publisher(Detection3DArray, "objects_3d", 1)
-        self.pose = self.create_publisher(PoseStamped, "pose", 1)
+        self.pose = self.create_publisher(PoseWithCovarianceStamped, "pose", 1)
         self.path = self.create_publisher(Path, "path", 1)
         sensor = qos_profile_sensor_data
         self.create_subscription(CameraInfo, "camera_info", self.on_camera, sensor)
@@ -139,7 +147,10 @@ class DqslamNode(Node):
         found = self.session.map_from_base()
         if found is not None:
             at = Header(frame_id=frame, stamp=Time(nanoseconds=round(found[0] * 1e9)).to_msg())
-            self.pose.publish(PoseStamped(header=at, pose=_pose(found[1])))
+            pose = PoseWithCovarianceStamped(header=at)
+            pose.pose.pose = _pose(found[1])
+            pose.pose.covariance = self.session.covariance_in_map().ravel().tolist()
+            self.pose.publish(pose)
         objects = self.session.objects()
         self.markers.publish(_markers(objects, header))
         self.boxes.publish(

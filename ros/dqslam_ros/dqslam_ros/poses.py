@@ -26,6 +26,21 @@ def pose_of(matrix: Matrix) -> NDArray[np.float64]:
     return np.concatenate([matrix[:3, 3], turn])
 
 
+def covariance_in_map(
+    covariance: Matrix, map_from_base: Matrix, base_from_camera: Matrix
+) -> Matrix:
+    """Return the covariance (6, 6) of a robot's pose as geometry_msgs/PoseWithCovariance has it.
+
+    What is given is that of the camera in the frame of the camera. ROS has the position and the
+    rotation about the axes of the map, in that order.
+    """
+    rotation, (x, y, z) = base_from_camera[:3, :3], base_from_camera[:3, 3]
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    to_base = np.block([[rotation, cross @ rotation], [np.zeros((3, 3)), rotation]])
+    to_map = np.kron(np.eye(2), map_from_base[:3, :3]) @ to_base
+    return to_map @ covariance @ to_map.T
+
+
 class PoseBuffer:
     """The latest poses by time, from which poses between them are interpolated."""
 

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 import dqslam as dq
 from dqslam import _core
 from dqslam_ros.messages import ImageCamera, boxes_of, seconds
-from dqslam_ros.poses import Matrix, PoseBuffer, matrix_of, pose_of
+from dqslam_ros.poses import Matrix, PoseBuffer, covariance_in_map, matrix_of, pose_of
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -213,6 +213,15 @@ class Session:
         assert self._base_from_camera is not None
         base = matrix_of(self.slam.pose) @ np.linalg.inv(self._base_from_camera)
         return self._last[0], pose_of(base)
+
+    def covariance_in_map(self) -> NDArray[np.float64] | None:
+        """Return the covariance of ``map_from_base`` as ROS has it, (6, 6); None if not located."""
+        found = self.map_from_base()
+        if found is None:
+            return None
+        assert self.slam is not None and self._base_from_camera is not None
+        covariance = self.slam.pose_covariance
+        return covariance_in_map(covariance, matrix_of(found[1]), self._base_from_camera)
 
     def objects(self) -> list[MapObject]:
         """Return the objects of the map."""
