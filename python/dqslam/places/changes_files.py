@@ -122,6 +122,8 @@ def _change(entry: dict[str, Any]) -> Change:
         second_id=ids["second_id"],
         first_center=arrays["first_center"],
         second_center=arrays["second_center"],
+        displacement=arrays["displacement"],
+        covariance=arrays["covariance"],
     )
 
 
