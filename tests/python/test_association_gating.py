@@ -5,9 +5,16 @@ import pytest
 from scipy.stats import chi2
 
 from dqslam import PoseModel, _core
-from dqslam.association import CHI2_GATE
+from dqslam.association import CHI2_GATE, gating
 from dqslam.association.assignment import assign
-from dqslam.association.gating import GATE, PredictedBoxes, pair_costs, predict_boxes
+from dqslam.association.gating import (
+    GATE,
+    PredictedBoxes,
+    pair_costs,
+    predict_boxes,
+    predict_certain_boxes,
+)
+from dqslam.association.occlusion import hidden_edges
 from dqslam.association.scene_map import SceneMap
 from dqslam.assumptions import BoxNoise
 from scenes import CAMERA, cut_by_the_border, outline
@@ -185,6 +192,38 @@ def test_what_the_object_touches_outside_the_image_drops_out_too():
 
 
 # --- assignment
+
+
+@pytest.mark.parametrize("pairs_at_a_time", [1, 500, 1_000_000])
+def test_certain_boxes_of_many_images_are_those_of_each_by_itself(monkeypatch, pairs_at_a_time):
+    """Also with objects behind the camera, outside the image, and that hide others."""
+    monkeypatch.setattr(gating, "MOST_PAIRS_AT_A_TIME", pairs_at_a_time)
+    random = np.random.default_rng(4)
+    moves = random.normal(size=(17, 6)) * np.repeat([0.3, 0.5], 3)
+    poses = _core.plus(PoseModel.SE3, np.tile(POSE, (17, 1)), moves)
+    centers = random.uniform([-2, -1, -1], [2, 1, 6], (24, 3))
+    objects = np.array([ellipsoid(center) for center in centers])
+    certain = np.zeros((6 + 9 * 24,) * 2)
+    found = list(predict_certain_boxes(CAMERA, PoseModel.SE3, poses, objects, sees_hidden=True))
+    assert len(found) == 17
+    for pose, together in zip(poses, found, strict=True):
+        alone = predict_boxes(CAMERA, PoseModel.SE3, pose, objects, certain)
+        np.testing.assert_array_equal(together.object_row, alone.object_row)
+        np.testing.assert_array_equal(together.box, alone.box)
+        np.testing.assert_array_equal(together.covariance, alone.covariance)
+        np.testing.assert_array_equal(together.out_of_sight, alone.out_of_sight)
+        shown = objects[alone.object_row]
+        hidden = hidden_edges(CAMERA, PoseModel.SE3, pose[None], shown)[0]
+        np.testing.assert_array_equal(together.hidden, hidden)
+    assert sum(one.hidden.sum() for one in found) > 10
+    assert len({len(one.box) for one in found}) > 2
+
+
+def test_certain_boxes_without_objects_or_images():
+    none = list(predict_certain_boxes(CAMERA, PoseModel.SE3, POSE[None], np.zeros((0, 9))))
+    assert [len(one.box) for one in none] == [0]
+    objects = ellipsoid([0, 0, 4])[None]
+    assert not list(predict_certain_boxes(CAMERA, PoseModel.SE3, np.zeros((0, 7)), objects))
 
 
 def total_costs(cost, null):

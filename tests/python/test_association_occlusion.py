@@ -15,7 +15,7 @@ from dqslam import (
     simulate,
 )
 from dqslam.association import associate
-from dqslam.association.gating import pair_costs, predict_boxes
+from dqslam.association.gating import pair_costs, predict_certain_boxes
 from dqslam.association.occlusion import hidden_edges, shortened_edges
 
 CAMERA = Camera(500.0, 500.0, 319.5, 239.5, 640, 480)
@@ -104,10 +104,8 @@ def test_edges_that_are_not_flagged_are_those_of_the_whole_object():
 
 def test_a_box_that_ends_before_a_hidden_edge_costs_nothing():
     far, near = ball([0, 0, 4], 0.5), ball([0.3, 0, 2], 0.1)
-    certain = np.zeros((24, 24))
-    predicted = predict_boxes(
-        CAMERA, PoseModel.SE3, HERE[0], np.array([far, near]), certain, sees_hidden=True
-    )
+    objects = np.array([far, near])
+    predicted = next(predict_certain_boxes(CAMERA, PoseModel.SE3, HERE, objects, sees_hidden=True))
     box = predicted.box[:1].copy()
     covariance, uncut = np.eye(4)[None], np.zeros((1, 4), dtype=np.bool_)
     whole = pair_costs(CAMERA, predicted, box, covariance, uncut, np.ones((1, 2))).cost[0, 0]
@@ -119,7 +117,7 @@ def test_a_box_that_ends_before_a_hidden_edge_costs_nothing():
     assert (
         pair_costs(CAMERA, predicted, box, covariance, uncut, np.ones((1, 2))).cost[0, 0] == np.inf
     )
-    blind = predict_boxes(CAMERA, PoseModel.SE3, HERE[0], np.array([far, near]), certain)
+    blind = next(predict_certain_boxes(CAMERA, PoseModel.SE3, HERE, objects))
     assert not blind.hidden.any()
 
 

@@ -177,14 +177,7 @@ def _depth_error(towards: Floats, covariance: Floats) -> float:
     return float(np.sqrt(max(variance, 0.0))) / float(towards @ towards)
 
 
-def predict(
-    scene: SceneMap,
-    pose: int,
-    object_rows: Ints,
-    covariance: Floats,
-    *,
-    sees_hidden: bool = False,
-) -> PredictedBoxes:
+def predict(scene: SceneMap, pose: int, object_rows: Ints, covariance: Floats) -> PredictedBoxes:
     """Return where objects are expected in the image of a pose, by places in ``object_rows``."""
     recording = scene.recording
     return predict_boxes(
@@ -193,7 +186,6 @@ def predict(
         scene.poses[pose],
         scene.ellipsoids[object_rows],
         covariance,
-        sees_hidden=sees_hidden,
     )
 
 

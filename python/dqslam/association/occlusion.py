@@ -21,12 +21,16 @@ OUTWARD = np.array([-1.0, -1.0, 1.0, 1.0])
 
 
 def hidden_edges(
-    camera: _core.Camera, model: _core.PoseModel, poses: Floats, ellipsoids: Floats
+    camera: _core.Camera,
+    model: _core.PoseModel,
+    poses: Floats,
+    ellipsoids: Floats,
+    shown: Bools | None = None,
 ) -> Bools:
     """Tell which edges of the boxes of objects (o, 9) others may hide from poses (n, d): (n, o, 4).
 
     The object whose center is nearer hides the other one. What is not in front of the camera is
-    not hidden.
+    not hidden. With ``shown`` (n, o), objects without a flag neither hide others nor are hidden.
     """
     n, o = len(poses), len(ellipsoids)
     hidden = np.zeros((n, o, 4), dtype=np.bool_)
@@ -44,6 +48,8 @@ def hidden_edges(
         for axis in (0, 1):
             meets &= wide[:, None, :, axis] < box[:, :, None, axis + 2]
             meets &= wide[:, None, :, axis + 2] > box[:, :, None, axis]
+    if shown is not None:
+        meets &= shown[:, :, None] & shown[:, None, :]
     image, far, near = np.nonzero(meets)
     if not image.size:
         return hidden

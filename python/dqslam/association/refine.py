@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -15,7 +15,8 @@ from dqslam.association.consistency import (
     find_scattered,
     join_duplicates,
 )
-from dqslam.association.follow import Follower, choose, predict
+from dqslam.association.follow import Follower, choose
+from dqslam.association.gating import PredictedBoxes, predict_certain_boxes
 from dqslam.association.images import group_by_pose
 from dqslam.association.initiation import MIN_VIEWS
 from dqslam.association.scene_map import SceneMap
@@ -99,8 +100,10 @@ def reassign(scene: SceneMap, switch_cost: float) -> None:
     labels = scene.labels
     alive = np.flatnonzero(labels.box_counts > 0)
     found = np.full(len(labels.tracklets), -1)
-    for pose, rows in group_by_pose(scene.recording.detections.pose):
-        found[rows] = assign_afterwards(scene, pose, rows, alive, switch_cost)
+    images = group_by_pose(scene.recording.detections.pose)
+    predictions = _predict(scene, [pose for pose, _ in images], alive)
+    for (_, rows), predicted in zip(images, predictions, strict=True):
+        found[rows] = _choose_sure(scene, rows, alive, predicted, switch_cost)
     labels.release_all()
     labels.assign(np.arange(len(found)), found)
     shown = np.flatnonzero(found >= 0)
@@ -115,13 +118,30 @@ def reassign(scene: SceneMap, switch_cost: float) -> None:
 def assign_afterwards(
     scene: SceneMap, pose: int, rows: Ints, object_rows: Ints, switch_cost: float
 ) -> Ints:
-    """Return the objects that the boxes of an image show, -1 for none, shape (b,).
+    """Return the objects that the boxes of an image show, -1 for none, shape (b,)."""
+    predicted = next(_predict(scene, [pose], object_rows))
+    return _choose_sure(scene, rows, object_rows, predicted, switch_cost)
+
+
+def _predict(scene: SceneMap, poses: list[int], object_rows: Ints) -> Iterator[PredictedBoxes]:
+    """Return where objects are expected in the images of some poses.
 
     The path and the objects have been fitted to these very boxes: they count as certain, also in
     which of them hides another, where that is minded.
     """
-    k = scene.recording.odometry.covariance.shape[1]
-    certain = np.zeros((k + 9 * len(object_rows),) * 2)
-    predicted = predict(scene, pose, object_rows, certain, sees_hidden=scene.minds_occlusion)
+    recording = scene.recording
+    return predict_certain_boxes(
+        recording.camera,
+        recording.odometry.pose_model,
+        scene.poses[poses],
+        scene.ellipsoids[object_rows],
+        sees_hidden=scene.minds_occlusion,
+    )
+
+
+def _choose_sure(
+    scene: SceneMap, rows: Ints, object_rows: Ints, predicted: PredictedBoxes, switch_cost: float
+) -> Ints:
+    """Return the objects that the boxes of an image show, -1 for none or in doubt, shape (b,)."""
     choice, margin = choose(scene, rows, object_rows, predicted, switch_cost)
     return np.where(margin >= MIN_MARGIN_AFTERWARDS, choice, -1)

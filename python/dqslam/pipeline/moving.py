@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import replace
 
 import numpy as np
@@ -77,11 +78,13 @@ def _path_covariance(
     """Return how the covariance of the cameras at some images is found from the estimate."""
     if options.mode == _core.Mode.MAPPING or not output.estimate.is_ellipsoid.any():
         return lambda images: None
-    graph, state = problem_of(output, recording)
+    # Most recordings have nothing that moves: the problem is laid out when it is asked for.
+    problem = functools.cache(lambda: problem_of(output, recording))
     solver = options.solve_options()
     motion = motion_of_camera(recording.odometry.pose_model, recording.camera)
 
     def joint(images: Ints) -> Floats | None:
+        graph, state = problem()
         try:
             spread = _core.joint_covariance(graph.core, solver, state, images.tolist(), [])
         except RuntimeError:  # a box is undefined, or the data leave a pose open
