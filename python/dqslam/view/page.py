@@ -21,6 +21,7 @@ from dqslam._outputs import output_set
 from dqslam.io.files import write_text
 from dqslam.view.body import Body
 from dqslam.view.scene import Scene, SceneObject, Spread
+from dqslam.view.tracks import SceneTrack
 
 _STATIC = Path(__file__).with_name("static")
 WRITTEN_BY = "dqslam view"
@@ -72,6 +73,7 @@ def _describe(scene: Scene) -> dict[str, Any]:
         "truth": [_rounded(run) for run in scene.truth],
         "objects": [_object(one) for one in scene.objects],
         "trueObjects": [_object(one) for one in scene.true_objects],
+        "tracks": [_track(one) for one in scene.tracks],
         "boxes": {
             "pose": boxes.pose.tolist(),
             "box": np.round(boxes.box, 2).tolist(),
@@ -104,6 +106,20 @@ def _body(one: Body) -> dict[str, Any]:
         "shape": one.shape,
         "hull": _rounded(one.hull),
         "lines": [_rounded(line) for line in one.lines],
+    }
+
+
+def _track(one: SceneTrack) -> dict[str, Any]:
+    track = one.track
+    return {
+        "id": track.track_id,
+        "className": track.class_name,
+        "color": one.color,
+        "sides": _rounded(track.sides),
+        "pose": track.pose.tolist(),
+        "centers": _rounded(track.centers),
+        "orientations": _rounded(track.orientations),
+        "names": [one.name_at(row) for row in range(len(track))],
     }
 
 

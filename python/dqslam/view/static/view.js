@@ -7,7 +7,7 @@
   const shapesOf = (objects) => objects.map((object) =>
     object.semiAxes && geometry.shapeOf(object.semiAxes, object.orientation));
 
-  const shown = { estimate: true, odometry: true, truth: true, cameras: true, objects: true, names: true, covariance: false, follow: false };
+  const shown = { estimate: true, odometry: true, truth: true, cameras: true, objects: true, tracks: true, names: true, covariance: false, follow: false };
   let selected = {}, waiting = false, byFit = false;
 
   const shapes = shapesOf(scene.objects), trueShapes = shapesOf(scene.trueObjects);
@@ -74,11 +74,11 @@
 
   function makeSwitches() {
     const titles = {
-      estimate: "estimate", odometry: "odometry", truth: "truth", cameras: "cameras", objects: "objects",
+      estimate: "estimate", odometry: "odometry", truth: "truth", cameras: "cameras", objects: "objects", tracks: "what moves",
       names: "names", covariance: "covariance, 3σ", follow: "follow the camera",
     };
     const absent = {
-      truth: !scene.truth.length, objects: !scene.objects.length, names: !scene.objects.length,
+      truth: !scene.truth.length, tracks: !scene.tracks.length, objects: !scene.objects.length, names: !scene.objects.length && !scene.tracks.length,
       covariance: !scene.poseSpreads.length && !scene.objects.some((object) => object.spread),
     };
     for (const [name, title] of Object.entries(titles)) {
