@@ -101,14 +101,6 @@ def _object(one: SceneObject) -> dict[str, Any]:
     }
 
 
-def _body(one: Body) -> dict[str, Any]:
-    return {
-        "shape": one.shape,
-        "hull": _rounded(one.hull),
-        "lines": [_rounded(line) for line in one.lines],
-    }
-
-
 def _track(one: SceneTrack) -> dict[str, Any]:
     track = one.track
     return {
@@ -120,6 +112,14 @@ def _track(one: SceneTrack) -> dict[str, Any]:
         "centers": _rounded(track.centers),
         "orientations": _rounded(track.orientations),
         "names": [one.name_at(row) for row in range(len(track))],
+    }
+
+
+def _body(one: Body) -> dict[str, Any]:
+    return {
+        "shape": one.shape,
+        "hull": _rounded(one.hull),
+        "lines": [_rounded(line) for line in one.lines],
     }
 
 
