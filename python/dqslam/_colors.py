@@ -21,13 +21,14 @@ _LIGHTNESS = (0.45, 0.6, 0.75)
 _CHROMA = (0.07, 0.13)
 
 
-def class_colors(names: Iterable[str], others: Iterable[str] = ()) -> dict[str, str]:
+def class_colors(names: Iterable[str], *others: Iterable[str]) -> dict[str, str]:
     """Return the color of each class, ``#rrggbb``: of a map, in the order of names, then others.
 
     No two classes share one. The same names have the same colors in every figure and viewer.
     """
     ordered = sorted(set(names))
-    ordered += sorted(set(others) - set(ordered))
+    for more in others:
+        ordered += sorted(set(more) - set(ordered))
     return dict(zip(ordered, _distinct(len(ordered)), strict=True))
 
 
@@ -37,6 +38,20 @@ def object_colors(class_names: Sequence[str], of_class: dict[str, str] | None = 
         return _distinct(len(class_names))
     colors = class_colors(class_names) if of_class is None else of_class
     return [colors[name] for name in class_names]
+
+
+def moving_colors(
+    class_names: Sequence[str], moving: Iterable[str], of_class: dict[str, str]
+) -> dict[str, str]:
+    """Return the color of each class of what moves, beside a map of objects of some classes.
+
+    It is that of the class or, if colors tell the objects apart, one that no object has.
+    """
+    names = sorted(set(moving))
+    if not names or not is_colored_by_object(class_names):
+        return {name: of_class[name] for name in names}
+    count = len(class_names)
+    return dict(zip(names, _distinct(count + len(names))[count:], strict=True))
 
 
 def is_colored_by_object(class_names: Sequence[str]) -> bool:

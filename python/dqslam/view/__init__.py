@@ -12,3 +12,4 @@ from dqslam.view.scene import rgb as rgb
 from dqslam.view.session import SessionRecorder as SessionRecorder
 from dqslam.view.session import record_session as record_session
 from dqslam.view.session import serve_session as serve_session
+from dqslam.view.tracks import SceneTrack as SceneTrack

@@ -1,10 +1,10 @@
 """A scene as MCAP with the schemas of Foxglove, as a file or live over a websocket.
 
 Topics: ``/map`` has the surface of each object or its ellipsoid, cuboid or cylinder, ``/truth`` a
-cuboid for each true object of known size, ``/paths`` the paths. For each pose, at its time, ``/tf``
-has camera in world, ``/pose`` the same as a pose, ``/boxes`` the boxes of the image and
-``/outlines`` the outlines of the objects in it, in undistorted pixels. ``/calibration`` is the
-pinhole of these pixels.
+cuboid for each true object of known size, ``/paths`` the paths, also of what moves. For each pose,
+at its time, ``/tf`` has camera in world, ``/pose`` the same as a pose, ``/tracks`` a cuboid for
+each thing that moves, ``/boxes`` the boxes of the image and ``/outlines`` the outlines of the
+objects in it, in undistorted pixels. ``/calibration`` is the pinhole of these pixels.
 """
 
 from __future__ import annotations
@@ -20,14 +20,19 @@ import numpy as np
 from dqslam._checks import Floats
 from dqslam._colors import ESTIMATE, GRAY, ODOMETRY, TRUTH
 from dqslam._files import whole_file
+from dqslam.view.messages import WORLD, moving_cuboids
+from dqslam.view.messages import color as _color
+from dqslam.view.messages import pose as _pose
+from dqslam.view.messages import quaternion as _quaternion
+from dqslam.view.messages import vector as _vector
 from dqslam.view.picture import outlines_in_image
-from dqslam.view.scene import Scene, SceneObject, rgb
+from dqslam.view.scene import Scene, SceneObject
 from dqslam.view.surfaces import SurfaceMesh, coarser
 
 if TYPE_CHECKING:
     from foxglove import Context
 
-WORLD, CAMERA = "world", "camera"
+CAMERA = "camera"
 #: What a protobuf's time can be, seconds since 1970.
 _LATEST_S = 2.0**32 - 1.0
 _CORNER = 0.5  # Foxglove counts pixels from the corner of the image
@@ -118,6 +123,7 @@ class Channels:
         self.boxes = channels.ImageAnnotationsChannel("/boxes", context=context)
         self.outlines = channels.ImageAnnotationsChannel("/outlines", context=context)
         self.calibration = channels.CameraCalibrationChannel("/calibration", context=context)
+        self.tracks = channels.SceneUpdateChannel("/tracks", context=context)
 
     def log_world(self, scene: Scene, frame: int = 0) -> None:
         """Log what does not move, at the time of a pose."""
@@ -135,12 +141,14 @@ class Channels:
             self.truth.log(SceneUpdate(entities=cuboids), log_time=at)
         runs = [("estimate", [scene.estimate], ESTIMATE), ("odometry", [scene.odometry], ODOMETRY)]
         runs.append(("truth", list(scene.truth), TRUTH))
+        for one in scene.tracks:
+            runs.append((f"track {one.track.track_id}", [one.track.centers], one.color))
         paths = [_path(*run, stamp) for run in runs if run[1]]
         self.paths.log(SceneUpdate(entities=paths), log_time=at)
         self.calibration.log(_calibration(scene, stamp), log_time=at)
 
     def log_frame(self, scene: Scene, frame: int) -> None:
-        """Log the camera of a pose, the boxes of its image, and the outlines in it."""
+        """Log the camera of a pose, what moves, the boxes of its image, and the outlines in it."""
         from foxglove.messages import FrameTransform, FrameTransforms, ImageAnnotations, PoseInFrame
 
         at, stamp = _times(scene, frame)
@@ -155,6 +163,8 @@ class Channels:
         self.tf.log(FrameTransforms(transforms=[transform]), log_time=at)
         pose = PoseInFrame(timestamp=stamp, frame_id=WORLD, pose=_pose(here[:3], here[3:]))
         self.pose.log(pose, log_time=at)
+        if scene.tracks:
+            self.tracks.log(moving_cuboids(scene.tracks, frame, stamp), log_time=at)
         boxes = scene.boxes
         drawn = []
         for row in np.flatnonzero(boxes.pose == frame).tolist():
@@ -315,30 +325,3 @@ def _loop(points: Floats, color: str, stamp: Any) -> Any:
         outline_color=_color(color, 1.0),
         thickness=1.5,
     )
-
-
-def _pose(position: Floats, xyzw: Floats) -> Any:
-    from foxglove.messages import Pose
-
-    return Pose(position=_vector(position), orientation=_quaternion(xyzw))
-
-
-def _vector(values: Floats) -> Any:
-    from foxglove.messages import Vector3
-
-    x, y, z = values.tolist()
-    return Vector3(x=x, y=y, z=z)
-
-
-def _quaternion(xyzw: Floats) -> Any:
-    from foxglove.messages import Quaternion
-
-    x, y, z, w = xyzw.tolist()
-    return Quaternion(x=x, y=y, z=z, w=w)
-
-
-def _color(color: str, alpha: float) -> Any:
-    from foxglove.messages import Color
-
-    red, green, blue = (value / 255 for value in rgb(color))
-    return Color(r=red, g=green, b=blue, a=alpha)

@@ -22,6 +22,7 @@ from dqslam.io.files import write_text
 from dqslam.view.body import Body
 from dqslam.view.scene import Scene, SceneObject, Spread
 from dqslam.view.surfaces import SurfaceMesh, coarser
+from dqslam.view.tracks import SceneTrack
 
 _STATIC = Path(__file__).with_name("static")
 WRITTEN_BY = "dqslam view"
@@ -82,6 +83,7 @@ def _describe(scene: Scene) -> dict[str, Any]:
             for one in scene.objects
         ],
         "trueObjects": [_object(one) for one in scene.true_objects],
+        "tracks": [_track(one) for one in scene.tracks],
         "boxes": {
             "pose": boxes.pose.tolist(),
             "box": np.round(boxes.box, 2).tolist(),
@@ -106,6 +108,20 @@ def _object(one: SceneObject) -> dict[str, Any]:
         "spread": None if spread is None else _spread(spread),
         "numbers": one.numbers,
         "chiSquare": None if one.chi_square is None else round(one.chi_square, 3),
+    }
+
+
+def _track(one: SceneTrack) -> dict[str, Any]:
+    track = one.track
+    return {
+        "id": track.track_id,
+        "className": track.class_name,
+        "color": one.color,
+        "sides": _rounded(track.sides),
+        "pose": track.pose.tolist(),
+        "centers": _rounded(track.centers),
+        "orientations": _rounded(track.orientations),
+        "names": [one.name_at(row) for row in range(len(track))],
     }
 
 

@@ -15,13 +15,14 @@ import numpy as np
 
 from dqslam import _core
 from dqslam._checks import Floats, Ints
-from dqslam._colors import TRUTH, class_colors, object_colors
+from dqslam._colors import TRUTH, class_colors, moving_colors, object_colors
 from dqslam.evaluation import common_poses, evaluate_results, fit_boxes
 from dqslam.io import BoxTable, MapObjects, Results, Trajectory, TrueObjects
 from dqslam.metrics import Align, Alignment, up_direction
 from dqslam.solids import Solids
 from dqslam.view.body import Body, body_of
 from dqslam.view.numbers import Numbers, object_numbers, overview, true_object_numbers
+from dqslam.view.tracks import SceneTrack, scene_tracks
 
 if TYPE_CHECKING:
     from dqslam.view.surfaces import SurfaceMesh
@@ -135,6 +136,8 @@ class Scene:
     boxes: SceneBoxes
     overview: Numbers
     """The properties of the estimate as text."""
+    tracks: tuple[SceneTrack, ...] = ()
+    """What moves."""
 
 
 def rgb(color: str) -> tuple[int, int, int]:
@@ -181,7 +184,8 @@ def build_scene(
     truth: tuple[Floats, ...] = ()
     true_objects: tuple[SceneObject, ...] = ()
     true_names = () if objects is None else objects.class_name or ()
-    colors = class_colors(results.objects.class_names, true_names)
+    moving = [one.class_name for one in results.tracks]
+    colors = class_colors(results.objects.class_names, true_names, moving)
     if groundtruth is not None:
         evaluation = evaluate_results(results, groundtruth, align=align, objects=objects)
         estimated_from_true = _inverse(evaluation["true_from_estimated"])
@@ -205,6 +209,9 @@ def build_scene(
         solids=results.objects.solids,
         boxes=_boxes(results.boxes, results.objects),
         overview=overview(results, evaluation),
+        tracks=scene_tracks(
+            results.tracks, moving_colors(results.objects.class_names, moving, colors)
+        ),
     )
 
 

@@ -1,4 +1,4 @@
-// Names above the objects; of two that would cover each other, only the nearer one's.
+// Names above the objects and above what moves; of two that would cover each other, only the nearer one's.
 "use strict";
 
 const MOST_NAMES = 150;
@@ -8,11 +8,12 @@ function drawNames(context, drawn, selected) {
   const taken = [];
   context.font = "12px system-ui, sans-serif";
   context.textAlign = "center";
-  const order = drawn.filter((one) => one.mapped !== undefined)
-    .sort((a, b) => (b.mapped === selected.mapped) - (a.mapped === selected.mapped) || a.outline.depth - b.outline.depth);
-  for (const { object, outline } of order) {
+  const isChosen = (one) => one.mapped !== undefined && one.mapped === selected.mapped;
+  const order = drawn.filter((one) => one.mapped !== undefined || one.name)
+    .sort((a, b) => isChosen(b) - isChosen(a) || a.outline.depth - b.outline.depth);
+  for (const { object, name, outline } of order) {
     if (taken.length === MOST_NAMES) break;
-    const text = `${object.className} ${object.id}`;
+    const text = name || `${object.className} ${object.id}`;
     const half = context.measureText(text).width / 2 + 2;
     const x = outline.u, y = outline.v - outline.halfHeight - 5;
     const place = [x - half, y - 12, x + half, y + 3];

@@ -21,6 +21,7 @@ class SpaceView {
     this.everything = [...path, ...this.near(path)];
     this.orbit = new Orbit(canvas, scene.up, this.everything, onChange);
     this.ground = this.findGround(path);
+    this.moving = scene.tracks.map((track) => new MovingThing(track));
     const places = (poses) => poses.map((pose) => pose.slice(0, 3));
     this.paths = { odometry: [places(scene.odometry)], truth: scene.truth.map(places), estimate: [path] };
     for (const [name, runs] of Object.entries(this.paths)) this.paths[name] = runs.map((run) => new PathPieces(run));
@@ -33,14 +34,14 @@ class SpaceView {
     canvas.addEventListener("dblclick", (event) => this.flyTo(this.pick(event.offsetX, event.offsetY).mapped));
   }
 
-  /** Centers of the objects, without those so far off that the rest would be a dot. */
+  /** Centers of the objects and of what moves, without those so far off that the rest would be a dot. */
   near(path) {
     const middle = [0, 1, 2].map((k) => path.reduce((sum, point) => sum + point[k], 0) / path.length);
     const away = (point) => geometry.length(geometry.subtract(point, middle));
-    const centers = this.scene.objects.map((object) => object.center);
+    const { objects, tracks } = this.scene, centers = objects.map((object) => object.center);
     const usual = centers.map(away).sort((a, b) => a - b)[Math.floor(centers.length / 2)];
     const most = 3 * path.reduce((largest, point) => Math.max(largest, away(point)), usual || 0);
-    return centers.filter((center) => away(center) < most);
+    return [...centers, ...tracks.flatMap((track) => track.centers)].filter((center) => away(center) < most);
   }
 
   /** The height that the tenth part of the objects reaches down to, or the path, meters. */
@@ -100,11 +101,14 @@ class SpaceView {
     if (shown.covariance) this.scene.poseSpreads.forEach((spread) => this.addSpread(items, spread));
     if (shown.truth) this.scene.trueObjects.forEach((_, row) => this.addTrue(items, row, selected));
     this.scene.objects.forEach((_, row) => this.addObject(items, row, shown, selected));
+    const moving = this.moving.filter(({ track }) => shown.tracks && !hidden.has(track.className))
+      .map((thing) => thing.add(this, items, frame)).filter((seen) => seen);
+    this.counts.tracks = moving.length;
     // Light and rings only where there is room to see them, and for the largest on the canvas.
     const sizes = this.drawn.map(({ outline }) => outline.long).sort((a, b) => b - a);
     this.detailed = Math.max(8, sizes[MOST_DETAILED] || 0);
     items.sort((a, b) => b.depth - a.depth).forEach((item) => item.draw());
-    if (shown.names) this.counts.labels = drawNames(this.context, this.drawn, selected);
+    if (shown.names) this.counts.labels = drawNames(this.context, [...this.drawn, ...moving], selected);
     measure.draw(this);
     return this.counts;
   }

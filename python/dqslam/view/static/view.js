@@ -7,7 +7,10 @@
   const shapesOf = (objects) => objects.map((object) =>
     object.semiAxes && geometry.shapeOf(object.semiAxes, object.orientation));
 
-  const shown = { estimate: true, odometry: true, truth: true, cameras: true, objects: true, surfaces: true, names: true, covariance: false, follow: false };
+  const shown = {
+    estimate: true, odometry: true, truth: true, cameras: true, objects: true, surfaces: true, tracks: true,
+    names: true, covariance: false, follow: false,
+  };
   let selected = {}, waiting = false, byFit = false;
 
   const shapes = shapesOf(scene.objects), trueShapes = shapesOf(scene.trueObjects);
@@ -75,11 +78,13 @@
   function makeSwitches() {
     const titles = {
       estimate: "estimate", odometry: "odometry", truth: "truth", cameras: "cameras", objects: "objects",
-      surfaces: "surfaces", names: "names", covariance: "covariance, 3σ", follow: "follow the camera",
+      surfaces: "surfaces", tracks: "what moves", names: "names", covariance: "covariance, 3σ",
+      follow: "follow the camera",
     };
     const absent = {
-      truth: !scene.truth.length, objects: !scene.objects.length,
-      surfaces: !scene.objects.some((object) => object.surface), names: !scene.objects.length,
+      truth: !scene.truth.length, objects: !scene.objects.length, tracks: !scene.tracks.length,
+      surfaces: !scene.objects.some((object) => object.surface),
+      names: !scene.objects.length && !scene.tracks.length,
       covariance: !scene.poseSpreads.length && !scene.objects.some((object) => object.spread),
     };
     for (const [name, title] of Object.entries(titles)) {
