@@ -59,7 +59,7 @@ nitpick_ignore_regex = [
     ),
     (
         "py:.*",
-        r"dqslam\.(solids\.solids|view\.(scene|body|foxglove)|studies\.(sweep|batch)|plot)\..*",
+        r"dqslam\.(solids\.solids|view\.(scene|body|foxglove|surface_mesh)|studies\.(sweep|batch)|plot)\..*",
     ),
     ("py:.*", r"dqslam\.association\.scene_map\.SceneMap"),  # the inside of an association
     (

@@ -25,7 +25,7 @@ std::string ShowChanges(const pybind11::object& shown) {
   for (const auto& [name, member] : py::dict(type.attr("__dict__"))) {
     if (!PyObject_TypeCheck(member.ptr(), &PyProperty_Type)) continue;
     py::object value = shown.attr(name);
-    if (py::hasattr(value, "shape")) continue;  // of an array, which takes lines
+    if (py::hasattr(value, "ndim") && value.attr("ndim").cast<int>() > 1) continue;  // takes lines
     if (py::repr(value).equal(py::repr(plain.attr(name)))) continue;
     if (py::hasattr(value, "name")) value = value.attr("name");  // of an enumeration
     if (py::isinstance<py::float_>(value)) value = py::str("{:g}").format(value);

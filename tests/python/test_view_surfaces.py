@@ -11,7 +11,8 @@ from depth_scenes import Cuboid, at, cast, results_of, ring, write_files
 from dqslam.cli import main
 from dqslam.io import FileError, load_results
 from dqslam.view import build_scene, serve, write_mcap
-from dqslam.view.surfaces import SurfaceMesh, coarser, with_surfaces
+from dqslam.view.surface_mesh import SurfaceMesh
+from dqslam.view.surfaces import coarser, with_surfaces
 from test_view_foxglove import quaternion, read, vector
 
 pytest.importorskip("skimage", reason="the extra surface is not installed")

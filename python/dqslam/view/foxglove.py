@@ -27,7 +27,8 @@ from dqslam.view.messages import quaternion as _quaternion
 from dqslam.view.messages import vector as _vector
 from dqslam.view.picture import outlines_in_image
 from dqslam.view.scene import Scene, SceneObject
-from dqslam.view.surfaces import SurfaceMesh, coarser
+from dqslam.view.surface_mesh import SurfaceMesh
+from dqslam.view.surfaces import coarser
 
 if TYPE_CHECKING:
     from foxglove import Context

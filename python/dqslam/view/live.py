@@ -14,7 +14,7 @@ from dqslam._checks import Floats
 from dqslam._colors import ESTIMATE, ODOMETRY, TRUTH
 from dqslam.view.picture import draw_image
 from dqslam.view.scene import Scene, SceneObject, Spread, rgb
-from dqslam.view.surfaces import SurfaceMesh
+from dqslam.view.surface_mesh import SurfaceMesh
 
 if TYPE_CHECKING:
     from viser import ViserServer

@@ -21,7 +21,8 @@ from dqslam._outputs import output_set
 from dqslam.io.files import write_text
 from dqslam.view.body import Body
 from dqslam.view.scene import Scene, SceneObject, Spread
-from dqslam.view.surfaces import SurfaceMesh, coarser
+from dqslam.view.surface_mesh import SurfaceMesh
+from dqslam.view.surfaces import coarser
 from dqslam.view.tracks import SceneTrack
 
 _STATIC = Path(__file__).with_name("static")

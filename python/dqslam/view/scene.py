@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -22,10 +22,8 @@ from dqslam.metrics import Align, Alignment, up_direction
 from dqslam.solids import Solids
 from dqslam.view.body import Body, body_of
 from dqslam.view.numbers import Numbers, object_numbers, overview, true_object_numbers
+from dqslam.view.surface_mesh import SurfaceMesh
 from dqslam.view.tracks import SceneTrack, scene_tracks
-
-if TYPE_CHECKING:
-    from dqslam.view.surfaces import SurfaceMesh
 
 # The true path has a gap if its poses are further apart than this multiple of the usual distance.
 GAP = 5.0

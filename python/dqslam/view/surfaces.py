@@ -2,33 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from dqslam._checks import Floats, Ints
+from dqslam._checks import Ints
 from dqslam.io.files import FileError
 from dqslam.surface.files import FOLDER, TABLE, Mesh, read_meshes
 from dqslam.view.scene import Scene, rgb
+from dqslam.view.surface_mesh import SurfaceMesh
 
-Colors = NDArray[np.uint8]
 _MOST_CELLS = 1024  # along the longest side of a mesh, which is finer than any that is fused
 _STEP = 0.97  # from one size of cells to the next
-
-
-@dataclass(frozen=True, eq=False)
-class SurfaceMesh:
-    """The surface of an object, in the frame of its ellipsoid, so that it moves with it."""
-
-    vertices: Floats
-    """Meters, shape (v, 3)."""
-    triangles: Ints
-    """Rows of vertices, shape (f, 3), counter-clockwise from outside."""
-    colors: Colors
-    """Red, green and blue of each vertex, 0 to 255, shape (v, 3)."""
 
 
 def has_surfaces(directory: Path) -> bool:
