@@ -60,6 +60,34 @@ TEST(SwitchedCost, MinimizesToGemanMcClure) {
   ExpectJacobiansMatchPerturbation(*cost, blocks);
 }
 
+// Shifts an edge of some boxes, so that each has this chi-square at the truth.
+void Shift(int boxes, double chi_square, Graph* graph) {
+  for (int row = 0; row < boxes; ++row) {
+    graph->boxes.box(row, 2) += std::sqrt(chi_square * graph->boxes.covariance(row, 10));
+  }
+}
+
+TEST(NearlyAllFit, UnlessBoxesAreFarOrMany) {
+  const SolveOptions options;
+  const double threshold = options.outlier_chi_square;
+  const auto fit = [&](const Scene& scene) {
+    const PreparedGraph prepared(scene.graph, false);
+    const Monitor monitor;
+    return NearlyAllFit({prepared, options, monitor}, scene.truth);
+  };
+  const Scene exact = MakeScene<Se2>();
+  const int few = exact.graph.boxes.size() / 100;
+  ASSERT_GE(few, 1);
+  EXPECT_TRUE(fit(exact));
+  Scene near = exact, far = exact, many = exact;
+  Shift(few, 2 * threshold, &near.graph);
+  EXPECT_TRUE(fit(near));
+  Shift(few, 11 * threshold, &far.graph);
+  EXPECT_FALSE(fit(far));
+  Shift(few + 1, 2 * threshold, &many.graph);
+  EXPECT_FALSE(fit(many));
+}
+
 // A tenth of the boxes go to the next object; exact measurements otherwise.
 TEST(RobustSolve, FindsTheTruthAndTheWrongBoxes) {
   Scene scene = MakeScene<Se3>();
