@@ -23,6 +23,7 @@ constexpr int kFewBoxes = 3;
 constexpr double kMixed = 0.25;
 constexpr int kSomeBoxes = 4;
 constexpr int kParts = 6;
+constexpr double kSameCost = 1e-6;  // relative: the same minimum, reached from two sides
 
 // Replaces the state by an attempt if that has a lower cost.
 bool KeepIfBetter(const State& attempt, const Summary& total, State* state, Summary* summary) {
@@ -223,22 +224,25 @@ void TryOtherStarts(const SolveContext& context,
     const std::vector<int>& boxes = boxes_of_object[object];
     if (boxes.empty()) continue;
     const Stage alone = StageOfObject(all, boxes, context.graph());
-    State best = attempt;
-    double lowest = std::numeric_limits<double>::infinity();
-    for (const Vector9d& start :
-         OtherStarts(context, all, from_parts, attempt, costs, object, boxes)) {
-      State moved = attempt;
-      moved.landmarks.row(object) = start;
-      const double cost = Optimize(context, alone, &moved).final_cost;
-      if (cost >= lowest) continue;
+    const auto optimize_from = [&](const Vector9d& start) {
+      attempt.landmarks.row(object) = start;
+      attempt.switches = state->switches;  // those of one trial are not the next one's
+      return Optimize(context, alone, &attempt).final_cost;
+    };
+    const std::vector<Vector9d> starts =
+        OtherStarts(context, all, from_parts, attempt, costs, object, boxes);
+    if (starts.empty()) continue;
+    const Vector9d present = attempt.landmarks.row(object);
+    Vector9d best = present;
+    double lowest = optimize_from(present) * (1 - kSameCost);
+    for (const Vector9d& start : starts) {
+      const double cost = optimize_from(start);
+      if (!(cost < lowest)) continue;
       lowest = cost;
-      best = moved;
+      best = attempt.landmarks.row(object);
     }
-    if (std::isinf(lowest)) continue;
-    State stayed = attempt;
-    if (!(lowest < Optimize(context, alone, &stayed).final_cost)) continue;
-    attempt.landmarks.row(object) = best.landmarks.row(object);
-    any = true;
+    attempt.landmarks.row(object) = best;
+    any = any || best != present;
   }
   if (!any) return;
   Append(Optimize(context, all, &attempt), &total);

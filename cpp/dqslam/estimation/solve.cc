@@ -132,12 +132,15 @@ class Solver {
       }
     }
     if (nearly_all_fit) {
-      last.loss = Loss::kNone;
-      last.weights.assign(last.boxes.size(), 1);
+      // Which boxes fit shows long before the last digits of the estimate.
+      Stage all = last;
+      all.loss = Loss::kNone;
+      all.function_tolerance = options_.grow_tolerance;
+      Append(Batch(all, state), &summary);
     } else if (Graduates()) {
       Append(GraduateNonConvexity(context_, state), &summary);
-      last = InlierStage(context_, *state);
     }
+    if (Graduates()) last = InlierStage(context_, *state);
     if (options_.loss == Loss::kSwitchable) SetSwitches(state);
     Append(Batch(last, state), &summary);
     // Each round can only lower the truncated cost, and ends when the same boxes fit as before.
