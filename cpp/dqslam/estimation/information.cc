@@ -49,12 +49,18 @@ class JacobianRows {
     const PoseRow pose{context_.graph().boxes.pose[box.row]};
     const ObjectRow object{context_.graph().boxes.object[box.row]};
     if constexpr (Landmark::kModel == LandmarkModel::kEllipsoid) {
-      if (box.shape == Shape::kEllipsoid && !IsAlgebraic(box.residual.residual)) {
-        return VisitEdges(box, pose, object);
+      if (!IsAlgebraic(box.residual.residual)) {
+        const double* values = ValuesOf(object);
+        return box.shape == Shape::kEllipsoid
+                   ? AddEdges(box, Unpacked<EllipsoidModel>(values), pose, object)
+                   : AddEdges(
+                         box, Unpacked<BodyModel>(RoundedModel(box.shape), values), pose, object);
       }
+      return Visit(MakeAlgebraicCost<Pose, Landmark>(context_, box), pose, object);
+    } else {
+      return VisitBoxCost<Pose, Landmark>(
+          context_, box, [&](const auto& cost) { return Visit(cost, pose, object); });
     }
-    return VisitBoxCost<Pose, Landmark>(
-        context_, box, [&](const auto& cost) { return Visit(cost, pose, object); });
   }
 
   void MoveTo(Information* information) {
@@ -80,14 +86,17 @@ class JacobianRows {
   }
 
   // Boxes and tangents, differentiated by hand.
-  bool VisitEdges(const StageBox& box, PoseRow pose, ObjectRow object) {
+  template <typename Model>
+  bool AddEdges(const StageBox& box,
+                const Unpacked<Model>& landmark,
+                PoseRow pose,
+                ObjectRow object) {
     Matrix<kBoxSize, 1> residual;
     Matrix<kBoxSize, Pose::kTangentSize> by_pose;
     Matrix<kBoxSize, kLandmarkSize> by_object;
     const Station station = Station::At<Pose>(ValuesOf(pose), context_.prepared.mount);
-    const Unpacked<EllipsoidModel> ellipsoid(ValuesOf(object));
     if (!LinearizeBox<Pose, true>(
-            context_.prepared, box, station, ellipsoid, &residual, &by_pose, &by_object)) {
+            context_.prepared, box, station, landmark, &residual, &by_pose, &by_object)) {
       return false;
     }
     Matrix<kBoxSize, Pose::kTangentSize + kLandmarkSize> jacobian;

@@ -40,6 +40,16 @@ SharedParameters ParametersOf(SharedRow, const double* values) {
   return {values};
 }
 
+/// The cost of a box with one of the algebraic residuals.
+template <typename Pose, typename Landmark>
+AlgebraicCost<Pose, Landmark> MakeAlgebraicCost(const SolveContext& context, const StageBox& box) {
+  return {{},
+          context.prepared.mount,
+          BoxLines(context.graph().camera, context.graph().boxes.box.row(box.row)),
+          Eigen::Matrix4d::Identity() / context.options.algebraic_sigma,
+          box.residual.residual == Residual::kAlgebraicNormalized};
+}
+
 /// Calls visit(cost) with the cost of a box, and returns the result of the call.
 template <typename Pose, typename Landmark, typename Visit>
 auto VisitBoxCost(const SolveContext& context, const StageBox& box, Visit&& visit) {
@@ -48,14 +58,7 @@ auto VisitBoxCost(const SolveContext& context, const StageBox& box, Visit&& visi
   const Eigen::Vector4d observed = context.graph().boxes.box.row(box.row);
   const Eigen::Matrix4d& sqrt_information = context.prepared.box_sqrt_information[box.row];
   const BoxResidual& role = box.residual;
-  if (IsAlgebraic(role.residual)) {
-    return visit(
-        AlgebraicCost<Pose, Landmark>{{},
-                                      mount,
-                                      BoxLines(camera, observed),
-                                      Eigen::Matrix4d::Identity() / context.options.algebraic_sigma,
-                                      role.residual == Residual::kAlgebraicNormalized});
-  }
+  if (IsAlgebraic(role.residual)) return visit(MakeAlgebraicCost<Pose, Landmark>(context, box));
   const auto visit_edges = [&](auto model) {
     using Model = decltype(model);
     if (role.residual == Residual::kBox) {
@@ -65,8 +68,10 @@ auto VisitBoxCost(const SolveContext& context, const StageBox& box, Visit&& visi
     return visit(TangentCost<Pose, Model>{
         {}, camera, mount, observed, sqrt_information, role.depth, role.one_sided, model});
   };
-  return box.shape == Shape::kEllipsoid ? visit_edges(Landmark{})
-                                        : visit_edges(RoundedModel(box.shape));
+  if constexpr (Landmark::kModel == LandmarkModel::kEllipsoid) {
+    if (box.shape != Shape::kEllipsoid) return visit_edges(RoundedModel(box.shape));
+  }
+  return visit_edges(Landmark{});
 }
 
 /// Calls visit(cost) with each prior on an ellipsoid.  Returns false where a call returns false.
