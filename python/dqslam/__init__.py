@@ -66,7 +66,7 @@ if TYPE_CHECKING:  # the one list of public names, a line each: lazy_exports rea
     from dqslam.calibration import solve_with_calibration as solve_with_calibration
     from dqslam.estimate import Estimate as Estimate
     from dqslam.evaluation import evaluate_results as evaluate_results
-    from dqslam.exchange import pose_graph as pose_graph
+    from dqslam.pose_graphs import pose_graph as pose_graph
     from dqslam.graph import Graph as Graph
     from dqslam.graph import build_graph as build_graph
     from dqslam.graph import solve as solve
