@@ -106,11 +106,15 @@ bool IsMixed(std::ptrdiff_t misfits, std::ptrdiff_t boxes) {
 }
 
 Stage StageOfObject(const Stage& all, const std::vector<int>& boxes, const Graph& graph) {
-  Stage stage = all;
+  Stage stage;  // not a copy: `all` has the rows of all boxes
   stage.boxes = boxes;
-  stage.weights.clear();
   stage.end_pose = stage.first_free_pose = graph.boxes.pose[boxes.back()] + 1;
   stage.moves_shared = false;
+  stage.residual = all.residual;
+  stage.loss = all.loss;
+  stage.minimizer = all.minimizer;
+  stage.max_iterations = all.max_iterations;
+  stage.function_tolerance = all.function_tolerance;
   return stage;
 }
 
@@ -226,7 +230,8 @@ void TryOtherStarts(const SolveContext& context,
     const Stage alone = StageOfObject(all, boxes, context.graph());
     const auto optimize_from = [&](const Vector9d& start) {
       attempt.landmarks.row(object) = start;
-      attempt.switches = state->switches;  // those of one trial are not the next one's
+      // The switches of one trial are not those of the next one.
+      for (const int row : boxes) attempt.switches[row] = state->switches[row];
       return Optimize(context, alone, &attempt).final_cost;
     };
     const std::vector<Vector9d> starts =

@@ -60,7 +60,9 @@ StageTerms SelectTerms(const SolveContext& context, const Stage& stage, const St
   const Graph& graph = context.graph();
   StageTerms terms{IndexVariables(graph, stage), state.shapes, {}, {}, {}};
   VariableIndex& variables = terms.variables;
-  for (int row = 0; row < graph.odometry.size(); ++row) {
+  // Where no pose is free, no odometry is in the stage.
+  const int odometry = variables.num_free_poses() > 0 ? graph.odometry.size() : 0;
+  for (int row = 0; row < odometry; ++row) {
     const auto [earlier, later] = std::minmax(graph.odometry.from[row], graph.odometry.to[row]);
     if (later < stage.first_free_pose || later >= stage.end_pose) continue;
     variables.first_pose = std::min<int>(variables.first_pose, earlier);
