@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "dqslam/geometry/outline.h"
+#include "dqslam/linear/parallel.h"
 #include "dqslam/solver/visit_object.h"
 
 namespace dqslam {
@@ -73,11 +74,16 @@ StageTerms SelectTerms(const SolveContext& context, const Stage& stage, const St
     const int row = stage.boxes[i];
     const double weight = stage.weights.empty() ? 1.0 : stage.weights[i];
     if (weight == 0) continue;
-    terms.boxes.push_back({row,
-                           weight,
-                           ChooseResidual(context, stage, state, row),
-                           ShapeOf(state.shapes, graph.boxes.object[row])});
+    terms.boxes.push_back({row, weight, {}, ShapeOf(state.shapes, graph.boxes.object[row])});
   }
+  const auto choose = [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+    for (std::ptrdiff_t i = begin; i < end; ++i) {
+      StageBox& box = terms.boxes[i];
+      box.residual = ChooseResidual(context, stage, state, box.row);
+    }
+  };
+  const auto num_boxes = static_cast<std::ptrdiff_t>(terms.boxes.size());
+  ParallelForParts(context.options.threads, num_boxes, kBoxesPerPart, choose);
   for (const MeasurementTable& table : graph.measurements) {
     std::vector<int>& rows = terms.measurements.emplace_back();
     for (int row = 0; row < table.size(); ++row) {
