@@ -106,9 +106,30 @@ TEST(Elimination, UpdatesThatWaitDoNotGrowWithTheDrive) {
   const auto Stacks = [](int poses) {
     const Pattern pattern = Drive(poses);
     const Elimination elimination(BlockMatrix(pattern.sizes, pattern.pairs));
+    EXPECT_TRUE(elimination.subtrees.empty());
     return elimination.stack_size[0] + elimination.stack_size[1];
   };
-  EXPECT_LT(Stacks(10000), 1.5 * Stacks(1000));
+  EXPECT_LT(Stacks(2000), 1.5 * Stacks(200));
+}
+
+// The fronts of a subtree add the updates of no other front, and only its last one hands an update
+// on.
+TEST(Elimination, SubtreesAreApart) {
+  const Pattern pattern = Drive(20000);
+  const Elimination elimination(BlockMatrix(pattern.sizes, pattern.pairs));
+  ASSERT_FALSE(elimination.subtrees.empty());
+  for (size_t s = 0; s < elimination.subtrees.size(); ++s) {
+    const auto [begin, end] = elimination.subtrees[s];
+    for (int f = begin; f < end; ++f) {
+      const Front& front = elimination.fronts[f];
+      EXPECT_EQ(front.stack / 2, static_cast<int>(s) + 1);
+      for (int k = front.child; k < elimination.fronts[f + 1].child; ++k) {
+        EXPECT_GE(elimination.children[k].front, begin);
+      }
+    }
+    const Front& last = elimination.fronts[end - 1];
+    EXPECT_GE(elimination.fronts[end].factor, last.factor + last.rows() * last.pivots + 3);
+  }
 }
 
 }  // namespace

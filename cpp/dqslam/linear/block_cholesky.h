@@ -38,9 +38,10 @@ class BlockCholesky {
 
   Elimination elimination_;
   int threads_;
-  std::vector<int> others_;     // the fronts of no subtree, ascending
-  std::vector<double> factor_;  // each front's rows() x pivots, undefined above the diagonal
-  std::vector<std::vector<double>> stacks_;  // the updates that wait
+  std::vector<int> others_;  // the fronts of no subtree, ascending
+  // Of a large matrix, the thread that first writes to memory of these two gets its pages.
+  Eigen::VectorXd factor_;               // each front's rows() x pivots, undefined above the diagonal
+  std::vector<Eigen::VectorXd> stacks_;  // the updates that wait
 };
 
 }  // namespace dqslam

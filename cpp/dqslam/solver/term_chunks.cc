@@ -23,9 +23,12 @@ std::vector<TermChunk> SplitTerms(const Graph& graph, StageTerms* terms) {
   const auto pose_of = [&](const StageBox& box) { return graph.boxes.pose[box.row]; };
   std::stable_sort(
       odometry.begin(), odometry.end(), [&](int a, int b) { return later(a) < later(b); });
-  std::stable_sort(boxes.begin(), boxes.end(), [&](const StageBox& a, const StageBox& b) {
+  const auto is_earlier = [&](const StageBox& a, const StageBox& b) {
     return pose_of(a) < pose_of(b);
-  });
+  };
+  if (!std::is_sorted(boxes.begin(), boxes.end(), is_earlier)) {
+    std::stable_sort(boxes.begin(), boxes.end(), is_earlier);
+  }
   std::vector<TermChunk> chunks;
   TermChunk chunk{variables.first_pose, variables.first_pose, {0, 0}, {0, 0}};
   while (chunk.end_pose < variables.end_pose) {
