@@ -4,9 +4,9 @@ import json
 
 import numpy as np
 import pytest
+from benchmarks.problems import NOISE, SIZES, chain
 
 import dqslam as dq
-from benchmarks.problems import NOISE, SIZES, chain
 from dqslam.pipeline import RunOptions
 
 

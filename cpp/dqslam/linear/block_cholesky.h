@@ -40,7 +40,7 @@ class BlockCholesky {
   int threads_;
   std::vector<int> others_;  // the fronts of no subtree, ascending
   // Of a large matrix, the thread that first writes to memory of these two gets its pages.
-  Eigen::VectorXd factor_;               // each front's rows() x pivots, undefined above the diagonal
+  Eigen::VectorXd factor_;  // each front's rows() x pivots, undefined above the diagonal
   std::vector<Eigen::VectorXd> stacks_;  // the updates that wait
 };
 

@@ -170,7 +170,7 @@ class Layout {
   std::vector<int> at_;           // row within the front at hand where a position begins
   std::vector<int> stack_;        // of each front
   std::vector<bool> ends_subtree_;
-  Lists blocks_;                  // of each front, as in PlacedBlock::index
+  Lists blocks_;  // of each front, as in PlacedBlock::index
   std::ptrdiff_t factor_size_ = 0;
   std::vector<std::ptrdiff_t> stack_top_;
 };

@@ -19,8 +19,9 @@ struct Front {
   /// The first of its rows, blocks and children in the lists of Elimination. They end where those
   /// of the next front begin.
   int row, block, child;
-  /// The stack of its update: 2 s or 2 s + 1 for a front of subtree s - 1, and 0 or 1 for a front of
-  /// no subtree.  The updates of its children are on the other of the two, or on that of a subtree.
+  /// The stack of its update: 2 s or 2 s + 1 for a front of subtree s - 1, and 0 or 1 for a front
+  /// of no subtree.  The updates of its children are on the other of the two, or on that of a
+  /// subtree.
   int stack;
   std::ptrdiff_t update;  ///< start on that stack: below x below, column-major, lower triangle
   std::ptrdiff_t factor;  ///< start in the factor: rows() x pivots, column-major

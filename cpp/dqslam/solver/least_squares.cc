@@ -145,7 +145,8 @@ class StageProblem : public LeastSquares {
 
     std::optional<Accumulator> rest;
     if (kDerivatives) rest.emplace(equations);
-    Linearizer<Pose, kDerivatives> linearizer(stage, values, objects, 0, 0, rest ? &*rest : nullptr);
+    Linearizer<Pose, kDerivatives> linearizer(
+        stage, values, objects, 0, 0, rest ? &*rest : nullptr);
     for (const double of_chunk : costs) linearizer.AddCost(of_chunk);
     linearizer.Skip(terms_.odometry.size() + terms_.boxes.size());
     const bool all = VisitOtherTerms<Pose, EllipsoidModel>(prepared_, terms_, &linearizer);

@@ -34,16 +34,14 @@ std::vector<TermChunk> SplitTerms(const Graph& graph, StageTerms* terms) {
   while (chunk.end_pose < variables.end_pose) {
     const int pose = chunk.end_pose++;
     size_t& next_odometry = chunk.odometry.end;
-    while (next_odometry < odometry.size() && later(odometry[next_odometry]) == pose) ++next_odometry;
+    while (next_odometry < odometry.size() && later(odometry[next_odometry]) == pose)
+      ++next_odometry;
     size_t& next_box = chunk.boxes.end;
     while (next_box < boxes.size() && pose_of(boxes[next_box]) == pose) ++next_box;
     const bool is_full = chunk.odometry.size() + chunk.boxes.size() >= kChunk;
     if (!is_full && chunk.end_pose < variables.end_pose) continue;
     chunks.push_back(chunk);
-    chunk = {chunk.end_pose,
-             chunk.end_pose,
-             {next_odometry, next_odometry},
-             {next_box, next_box}};
+    chunk = {chunk.end_pose, chunk.end_pose, {next_odometry, next_odometry}, {next_box, next_box}};
   }
   return chunks;
 }

@@ -7,8 +7,8 @@
 
 namespace dqslam {
 
-/// The boxes of successive poses, and the odometry whose later pose is one of these.  No other chunk
-/// has a term between the same two blocks.
+/// The boxes of successive poses, and the odometry whose later pose is one of these.  No other
+/// chunk has a term between the same two blocks.
 struct TermChunk {
   int first_pose, end_pose;
   TermRange odometry, boxes;
