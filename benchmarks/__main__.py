@@ -43,6 +43,7 @@ def bench(
     programs: Annotated[
         str, typer.Option(help=f"Separated by commas; {', '.join(_PROGRAMS)}.")
     ] = ",".join(_PROGRAMS),
+    threads: Annotated[int, typer.Option(min=1, help="Threads of dqslam's solver.")] = 1,
     limit: Annotated[
         float, typer.Option(min=1.0, help="Seconds of a run; beyond, it fails.")
     ] = 600,
@@ -60,7 +61,7 @@ def bench(
 
     skipped: dict[str, str] = {}
     linearized = _linearized(repeat, skipped) if LINEARIZE in cases else ()
-    commands = _commands(chosen, skipped)
+    commands = _commands(chosen, threads, skipped)
     measured: list[Measured] = []
     for name in cases:
         if name != LINEARIZE:
@@ -106,7 +107,7 @@ def _say(what: str) -> None:
     sys.stderr.write(f"== {what}\n")
 
 
-def _commands(chosen: list[str], skipped: dict[str, str]) -> dict[str, Command]:
+def _commands(chosen: list[str], threads: int, skipped: dict[str, str]) -> dict[str, Command]:
     """Return what runs each program; a peer that is not there is skipped, and why."""
     commands = {}
     for program in chosen:
@@ -118,7 +119,9 @@ def _commands(chosen: list[str], skipped: dict[str, str]) -> dict[str, Command]:
         elif program == ONLINE:
             commands[program] = online_command()
         else:
-            commands[program] = dqslam_command() if program == compare.DQSLAM else scipy_command()
+            commands[program] = (
+                dqslam_command(threads) if program == compare.DQSLAM else scipy_command()
+            )
     return commands
 
 

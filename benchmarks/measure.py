@@ -18,9 +18,10 @@ ROOT = Path(__file__).resolve().parents[1]
 Command = list[str]
 
 
-def dqslam_command() -> Command:
+def dqslam_command(threads: int = 1) -> Command:
     """Return what solves with dqslam."""
-    return [sys.executable, "-m", "benchmarks.programs.run_dqslam"]
+    command = [sys.executable, "-m", "benchmarks.programs.run_dqslam"]
+    return command if threads == 1 else [*command, f"--threads={threads}"]
 
 
 def online_command() -> Command:

@@ -5,17 +5,17 @@ import sys
 from benchmarks.exchange import Stopwatch, write_answer
 from benchmarks.files import load_problem
 from benchmarks.problems import NOISE, SIZES
-from dqslam import Summary, build_graph, solve
+from dqslam import SolveOptions, Summary, build_graph, solve
 
 
-def main(problem: str, answer: str) -> None:
+def main(problem: str, answer: str, threads: int = 1) -> None:
     """Read a problem, write the answer."""
     recording, _ = load_problem(problem)
     stopwatch = Stopwatch()
     with stopwatch("build"):
         graph = build_graph(recording, box_noise=NOISE, size_prior=SIZES)
     with stopwatch("solve"):
-        estimate, summary = solve(graph)
+        estimate, summary = solve(graph, SolveOptions(threads=threads))
     write_answer(
         answer,
         estimate.poses,
@@ -34,4 +34,5 @@ def split(summary: Summary) -> dict[str, float | None]:
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    *options, problem, answer = sys.argv[1:]
+    main(problem, answer, *(int(option.removeprefix("--threads=")) for option in options))

@@ -133,7 +133,11 @@ void BindOptions(py::module_& m) {
       .def_readwrite("grow_min_views",
                      &SolveOptions::grow_min_views,
                      "GROW starts an object when it has this number of boxes; the last addition "
-                     "starts all objects.");
+                     "starts all objects.")
+      .def_readwrite("threads",
+                     &SolveOptions::threads,
+                     "The most threads that work at a time. The result has the same bits with any "
+                     "number. Large problems gain; Ceres uses one thread.");
 }
 
 void BindSolution(py::module_& m) {

@@ -704,6 +704,13 @@ class SolveOptions:
         """
     @start.setter
     def start(self, arg0: Start) -> None: ...
+    @property
+    def threads(self) -> int:
+        """
+        The most threads that work at a time. The result has the same bits with any number. Large problems gain; Ceres uses one thread.
+        """
+    @threads.setter
+    def threads(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
 
 class State:
     """

@@ -33,20 +33,22 @@ def contradicted_objects(
     object_ids
         Shape (o,).
     """
-    real = np.isfinite(state.landmarks).all(axis=1)
-    count = np.bincount(core.boxes.object, minlength=len(object_ids))
-    fit = np.bincount(core.boxes.object[inliers], minlength=len(object_ids))
+    landmarks, object_of_box = state.landmarks, core.boxes.object
+    reach = _longest_semi_axes(landmarks)
+    real = np.isfinite(reach)
+    count = np.bincount(object_of_box, minlength=len(object_ids))
+    fit = np.bincount(object_of_box[inliers], minlength=len(object_ids))
     reasons = {}
     for row in np.flatnonzero(real & (count > 0)).tolist():
         misfits = count[row] - fit[row]
         if misfits > MOST_MISFITS * count[row]:
             reasons[int(object_ids[row])] = f"{misfits} of {count[row]} boxes do not fit"
             continue
-        rivals = real & _near(state.landmarks, row) & (fit >= fit[row])
+        rivals = real & _near(landmarks, reach, row) & (fit >= fit[row])
         for other in np.flatnonzero(rivals).tolist():
             if other == row or (fit[other] == fit[row] and other > row):
                 continue
-            boxes = np.flatnonzero(inliers & (core.boxes.object == row))
+            boxes = np.flatnonzero(inliers & (object_of_box == row))
             if np.mean(_fits(core, state, boxes, other)) >= SAME_PLACE_SHARE:
                 reasons[int(object_ids[row])] = (
                     f"it is where object {object_ids[other]} is, which fits its boxes as well"
@@ -55,11 +57,16 @@ def contradicted_objects(
     return reasons
 
 
-def _near(ellipsoids: Floats, row: int) -> Bools:
-    """Return which objects are nearer to one than the longest semi-axis of either, shape (o,)."""
-    reach = np.full(len(ellipsoids), np.nan)
-    for each in np.flatnonzero(np.isfinite(ellipsoids).all(axis=1)):
-        reach[each] = _core.axes_from_ellipsoid(ellipsoids[each])[1].max()
+def _longest_semi_axes(ellipsoids: Floats) -> Floats:
+    """Return the longest semi-axis of each ellipsoid, shape (o,), NaN where there is none."""
+    longest = np.full(len(ellipsoids), np.nan)
+    for row in np.flatnonzero(np.isfinite(ellipsoids).all(axis=1)).tolist():
+        longest[row] = _core.axes_from_ellipsoid(ellipsoids[row])[1].max()
+    return longest
+
+
+def _near(ellipsoids: Floats, reach: Floats, row: int) -> Bools:
+    """Return which objects are nearer to one than the reach of either, shape (o,)."""
     distance = np.linalg.norm(ellipsoids[:, :3] - ellipsoids[row, :3], axis=1)
     return np.asarray(distance < np.fmax(reach, reach[row]))
 

@@ -56,6 +56,19 @@ inline Pattern Drive(int poses) {
   return pattern;
 }
 
+/// Long drives that meet at one object, which each sees from its first pose.
+inline Pattern MeetingDrives(int drives, int poses) {
+  Pattern pattern{{9}, {}};
+  for (int drive = 0; drive < drives; ++drive) {
+    const Pattern one = Drive(poses);
+    const int first = static_cast<int>(pattern.sizes.size());
+    pattern.sizes.insert(pattern.sizes.end(), one.sizes.begin(), one.sizes.end());
+    for (const auto& [i, j] : one.pairs) pattern.pairs.emplace_back(first + i, first + j);
+    pattern.pairs.emplace_back(0, first);
+  }
+  return pattern;
+}
+
 /// Any blocks of the sizes that occur, any pairs; parts may be disconnected.
 inline Pattern RandomPattern(int blocks, int pairs, Random& random) {
   Pattern pattern;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <numeric>
 #include <set>
 #include <tuple>
 
@@ -106,9 +107,30 @@ TEST(Elimination, UpdatesThatWaitDoNotGrowWithTheDrive) {
   const auto Stacks = [](int poses) {
     const Pattern pattern = Drive(poses);
     const Elimination elimination(BlockMatrix(pattern.sizes, pattern.pairs));
-    return elimination.stack_size[0] + elimination.stack_size[1];
+    return std::accumulate(
+        elimination.stack_size.begin(), elimination.stack_size.end(), std::ptrdiff_t{0});
   };
-  EXPECT_LT(Stacks(10000), 1.5 * Stacks(1000));
+  EXPECT_LT(Stacks(40000), 1.5 * Stacks(10000));
+}
+
+// The fronts of a subtree add the updates of no other front, and only its last one hands an update
+// on.
+TEST(Elimination, SubtreesAreApart) {
+  const Pattern pattern = MeetingDrives(40, 500);
+  const Elimination elimination(BlockMatrix(pattern.sizes, pattern.pairs));
+  ASSERT_GE(elimination.subtrees.size(), 30u);
+  for (size_t s = 0; s < elimination.subtrees.size(); ++s) {
+    const auto [begin, end] = elimination.subtrees[s];
+    for (int f = begin; f < end; ++f) {
+      const Front& front = elimination.fronts[f];
+      EXPECT_EQ(front.stack / 2, static_cast<int>(s) + 1);
+      for (int k = front.child; k < elimination.fronts[f + 1].child; ++k) {
+        EXPECT_GE(elimination.children[k].front, begin);
+      }
+    }
+    const Front& last = elimination.fronts[end - 1];
+    EXPECT_GE(elimination.fronts[end].factor, last.factor + last.rows() * last.pivots + 3);
+  }
 }
 
 }  // namespace

@@ -71,6 +71,7 @@ TEST_F(SolveFailures, RefusesOptionsThatAreNotPositive) {
       {"grow_poses", [](SolveOptions& o, double v) { o.grow_poses = v; }},
       {"grow_iterations", [](SolveOptions& o, double v) { o.grow_iterations = v; }},
       {"grow_min_views", [](SolveOptions& o, double v) { o.grow_min_views = v; }},
+      {"threads", [](SolveOptions& o, double v) { o.threads = v; }},
   };
   for (const auto& [name, set] : cases) {
     for (const double bad : {0.0, -1.0}) {

@@ -5,9 +5,11 @@
 #include <iterator>
 #include <limits>
 #include <numeric>
+#include <thread>
 
 #include "dqslam/estimation/start_object.h"
 #include "dqslam/geometry/dispatch.h"
+#include "dqslam/linear/parallel.h"
 
 namespace dqslam {
 namespace {
@@ -99,6 +101,39 @@ std::vector<Vector9d> OtherStarts(const SolveContext& context,
   return starts;
 }
 
+// The parameters of an object in the best minimum that it reaches, with all else as in the state.
+// The trial is a copy of the state for use here.
+Vector9d BestStart(const SolveContext& context,
+                   const Stage& all,
+                   bool from_parts,
+                   const State& state,
+                   const Eigen::VectorXd& costs,
+                   int object,
+                   const std::vector<int>& boxes,
+                   State* trial) {
+  const Vector9d present = state.landmarks.row(object);
+  if (boxes.empty()) return present;
+  const std::vector<Vector9d> starts =
+      OtherStarts(context, all, from_parts, state, costs, object, boxes);
+  if (starts.empty()) return present;
+  const Stage alone = StageOfObject(all, boxes, context.graph());
+  const auto optimize_from = [&](const Vector9d& start) {
+    trial->landmarks.row(object) = start;
+    // The switches of one trial are not those of the next one.
+    for (const int row : boxes) trial->switches[row] = state.switches[row];
+    return Optimize(context, alone, trial).final_cost;
+  };
+  Vector9d best = present;
+  double lowest = optimize_from(present) * (1 - kSameCost);
+  for (const Vector9d& start : starts) {
+    const double cost = optimize_from(start);
+    if (!(cost < lowest)) continue;
+    lowest = cost;
+    best = trial->landmarks.row(object);
+  }
+  return best;
+}
+
 }  // namespace
 
 bool IsMixed(std::ptrdiff_t misfits, std::ptrdiff_t boxes) {
@@ -106,11 +141,15 @@ bool IsMixed(std::ptrdiff_t misfits, std::ptrdiff_t boxes) {
 }
 
 Stage StageOfObject(const Stage& all, const std::vector<int>& boxes, const Graph& graph) {
-  Stage stage = all;
+  Stage stage;  // not a copy: `all` has the rows of all boxes
   stage.boxes = boxes;
-  stage.weights.clear();
   stage.end_pose = stage.first_free_pose = graph.boxes.pose[boxes.back()] + 1;
   stage.moves_shared = false;
+  stage.residual = all.residual;
+  stage.loss = all.loss;
+  stage.minimizer = all.minimizer;
+  stage.max_iterations = all.max_iterations;
+  stage.function_tolerance = all.function_tolerance;
   return stage;
 }
 
@@ -215,36 +254,28 @@ void TryOtherStarts(const SolveContext& context,
                     bool from_parts,
                     State* state,
                     Summary* summary) {
-  State attempt = *state;
-  Summary total = *summary;
-  bool any = false;
   const std::vector<std::vector<int>> boxes_of_object = WeightedBoxes(context, all);
   const Eigen::VectorXd costs = BoxCosts(context, *state);
-  for (int object = 0; object < context.graph().num_objects(); ++object) {
-    const std::vector<int>& boxes = boxes_of_object[object];
-    if (boxes.empty()) continue;
-    const Stage alone = StageOfObject(all, boxes, context.graph());
-    const auto optimize_from = [&](const Vector9d& start) {
-      attempt.landmarks.row(object) = start;
-      attempt.switches = state->switches;  // those of one trial are not the next one's
-      return Optimize(context, alone, &attempt).final_cost;
-    };
-    const std::vector<Vector9d> starts =
-        OtherStarts(context, all, from_parts, attempt, costs, object, boxes);
-    if (starts.empty()) continue;
-    const Vector9d present = attempt.landmarks.row(object);
-    Vector9d best = present;
-    double lowest = optimize_from(present) * (1 - kSameCost);
-    for (const Vector9d& start : starts) {
-      const double cost = optimize_from(start);
-      if (!(cost < lowest)) continue;
-      lowest = cost;
-      best = attempt.landmarks.row(object);
+  // Where the path is fixed, objects do not depend on each other.  Only the calling thread may ask
+  // whether to stop.
+  const auto caller = std::this_thread::get_id();
+  const Monitor monitor = [&] {
+    return std::this_thread::get_id() != caller || !context.monitor || context.monitor();
+  };
+  const SolveContext apart{context.prepared, context.options, monitor};
+  const int threads = context.options.threads, num_objects = context.graph().num_objects();
+  State attempt = *state;
+  const auto try_each = [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+    State trial = *state;
+    for (auto object = static_cast<int>(begin); object < end; ++object) {
+      const std::vector<int>& boxes = boxes_of_object[object];
+      attempt.landmarks.row(object) =
+          BestStart(apart, all, from_parts, *state, costs, object, boxes, &trial);
     }
-    attempt.landmarks.row(object) = best;
-    any = any || best != present;
-  }
-  if (!any) return;
+  };
+  ParallelForParts(threads, num_objects, num_objects / (4 * threads) + 1, try_each);
+  if (attempt.landmarks == state->landmarks) return;
+  Summary total = *summary;
   Append(Optimize(context, all, &attempt), &total);
   KeepIfBetter(attempt, total, state, summary);
 }

@@ -40,6 +40,7 @@ void ValidateOptions(const SolveOptions& options) {
   require(options.grow_angle >= 0, "grow_angle must not be negative");
   require(options.grow_iterations > 0, "grow_iterations must be positive");
   require(options.grow_min_views > 0, "grow_min_views must be positive");
+  require(options.threads > 0, "threads must be positive");
 }
 
 void ValidateShapes(const SolveOptions& options, const std::vector<Shape>& shapes) {

@@ -1,10 +1,12 @@
 #include "dqslam/linear/block_cholesky.h"
 
 #include <algorithm>
+#include <atomic>
 #include <stdexcept>
 #include <string>
 
 #include "dqslam/linear/dense_front.h"
+#include "dqslam/linear/parallel.h"
 
 namespace dqslam {
 namespace {
@@ -24,9 +26,14 @@ auto BelowOf(const double* factor, const Front& front) {
 
 }  // namespace
 
-BlockCholesky::BlockCholesky(const BlockMatrix& A)
-    : elimination_(A), factor_(elimination_.fronts.back().factor + kFrontPadding) {
-  for (int s = 0; s < 2; ++s) stacks_[s].resize(elimination_.stack_size[s]);
+BlockCholesky::BlockCholesky(const BlockMatrix& A, int threads)
+    : elimination_(A),
+      threads_(threads),
+      factor_(elimination_.fronts.back().factor + kFrontPadding) {
+  for (const std::ptrdiff_t size : elimination_.stack_size) stacks_.emplace_back(size);
+  for (int f = 0; f < elimination_.num_fronts(); ++f) {
+    if (elimination_.fronts[f].stack < 2) others_.push_back(f);
+  }
 }
 
 bool BlockCholesky::Factorize(const BlockMatrix& A, const VectorXd& damping) {
@@ -43,16 +50,27 @@ bool BlockCholesky::Factorize(const BlockMatrix& A, const VectorXd& damping) {
   for (Eigen::Index r = 0; r < damping.size(); ++r) {
     placed_damping[elimination_.place[r]] = damping[r];
   }
-  for (int f = 0; f < elimination_.num_fronts(); ++f) {
-    const Front& front = elimination_.fronts[f];
-    PlaceBlocks(A, f);
-    for (int c = 0; c < front.pivots; ++c) {
-      Factor(f)[std::ptrdiff_t{c} * (front.rows() + 1)] += placed_damping[front.pivot + c];
+  const int subtrees = static_cast<int>(elimination_.subtrees.size());
+  std::atomic<bool> positive{true};
+  ParallelFor(threads_, subtrees, [&](int s) {
+    const auto [begin, end] = elimination_.subtrees[s];
+    for (int f = begin; f < end && positive; ++f) {
+      if (!Eliminate(A, placed_damping, f)) positive = false;
     }
-    AddUpdates(f);
-    if (!EliminatePivots(front.pivots, front.rows(), Factor(f), Update(f))) return false;
+  });
+  return positive && std::all_of(others_.begin(), others_.end(), [&](int f) {
+           return Eliminate(A, placed_damping, f);
+         });
+}
+
+bool BlockCholesky::Eliminate(const BlockMatrix& A, const VectorXd& placed_damping, int f) {
+  const Front& front = elimination_.fronts[f];
+  PlaceBlocks(A, f);
+  for (int c = 0; c < front.pivots; ++c) {
+    Factor(f)[std::ptrdiff_t{c} * (front.rows() + 1)] += placed_damping[front.pivot + c];
   }
-  return true;
+  AddUpdates(f);
+  return EliminatePivots(front.pivots, front.rows(), Factor(f), Update(f));
 }
 
 // Copies the entries of A into the columns of a front.
@@ -112,20 +130,24 @@ void BlockCholesky::AddUpdates(int f) {
 
 VectorXd BlockCholesky::Solve(const VectorXd& b) const {
   const Elimination& e = elimination_;
+  const int subtrees = static_cast<int>(e.subtrees.size());
   int most_below = 0;
   for (const Front& front : e.fronts) most_below = std::max(most_below, front.below);
-  VectorXd x(b.size()), workspace(most_below);
+  VectorXd x(b.size());
   for (Eigen::Index r = 0; r < b.size(); ++r) x[e.place[r]] = b[r];
-  for (int f = 0; f < e.num_fronts(); ++f) {  // L y = b
+
+  // L y = b, where subtract(r, v) subtracts v from a row below the pivots.
+  const auto forward = [&](int f, VectorXd& workspace, const auto& subtract) {
     const Front& front = e.fronts[f];
     const double* factor = factor_.data() + front.factor;
     auto y = x.segment(front.pivot, front.pivots);
     auto below = workspace.head(front.below);
     PivotsOf(factor, front).triangularView<Eigen::Lower>().solveInPlace(y);
     below.noalias() = BelowOf(factor, front) * y;
-    for (int r = 0; r < front.below; ++r) x[e.rows[front.row + r]] -= below[r];
-  }
-  for (int f = e.num_fronts() - 1; f >= 0; --f) {  // L^T x = y
+    for (int r = 0; r < front.below; ++r) subtract(e.rows[front.row + r], below[r]);
+  };
+  // L^T x = y.
+  const auto backward = [&](int f, VectorXd& workspace) {
     const Front& front = e.fronts[f];
     const double* factor = factor_.data() + front.factor;
     auto y = x.segment(front.pivot, front.pivots);
@@ -133,7 +155,42 @@ VectorXd BlockCholesky::Solve(const VectorXd& b) const {
     for (int r = 0; r < front.below; ++r) below[r] = x[e.rows[front.row + r]];
     y.noalias() -= BelowOf(factor, front).transpose() * below;
     PivotsOf(factor, front).transpose().triangularView<Eigen::Upper>().solveInPlace(y);
+  };
+
+  // What subtrees subtract from rows outside of them, which are the rows below their last fronts.
+  std::vector<VectorXd> outside(subtrees);
+  ParallelFor(threads_, subtrees, [&](int s) {
+    const auto [begin, end] = e.subtrees[s];
+    const Front& last = e.fronts[end - 1];
+    const auto rows = e.rows.begin() + last.row;
+    const int first_outside = last.pivot + last.pivots;
+    VectorXd workspace(most_below);
+    outside[s] = VectorXd::Zero(last.below);
+    for (int f = begin; f < end; ++f) {
+      int k = 0;  // rows ascend
+      forward(f, workspace, [&](int row, double value) {
+        if (row < first_outside) {
+          x[row] -= value;
+        } else {
+          while (rows[k] < row) ++k;
+          outside[s][k] += value;
+        }
+      });
+    }
+  });
+  for (int s = 0; s < subtrees; ++s) {
+    const Front& last = e.fronts[e.subtrees[s].end - 1];
+    for (int r = 0; r < last.below; ++r) x[e.rows[last.row + r]] -= outside[s][r];
   }
+  VectorXd workspace(most_below);
+  for (const int f : others_) {
+    forward(f, workspace, [&](int row, double value) { x[row] -= value; });
+  }
+  for (auto f = others_.rbegin(); f != others_.rend(); ++f) backward(*f, workspace);
+  ParallelFor(threads_, subtrees, [&](int s) {
+    VectorXd own(most_below);
+    for (int f = e.subtrees[s].end - 1; f >= e.subtrees[s].begin; --f) backward(f, own);
+  });
   VectorXd solution(b.size());
   for (Eigen::Index r = 0; r < b.size(); ++r) solution[r] = x[e.place[r]];
   return solution;

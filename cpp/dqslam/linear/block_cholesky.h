@@ -14,7 +14,7 @@ namespace dqslam {
 class BlockCholesky {
  public:
   /// Orders the blocks and lays out the factor. This needs only the pattern of A.
-  explicit BlockCholesky(const BlockMatrix& A);
+  explicit BlockCholesky(const BlockMatrix& A, int threads = 1);
 
   /// Factorizes A + diag(damping). `A` must have the pattern that the constructor was given, and
   /// `damping` has one entry per row of A.
@@ -26,6 +26,7 @@ class BlockCholesky {
   Eigen::VectorXd Solve(const Eigen::VectorXd& b) const;
 
  private:
+  bool Eliminate(const BlockMatrix& A, const Eigen::VectorXd& placed_damping, int f);
   void PlaceBlocks(const BlockMatrix& A, int f);
   void AddUpdates(int f);
 
@@ -36,8 +37,11 @@ class BlockCholesky {
   }
 
   Elimination elimination_;
-  std::vector<double> factor_;     // each front's rows() x pivots, undefined above the diagonal
-  std::vector<double> stacks_[2];  // the updates that wait
+  int threads_;
+  std::vector<int> others_;  // the fronts of no subtree, ascending
+  // Of a large matrix, the thread that first writes to memory of these two gets its pages.
+  Eigen::VectorXd factor_;  // each front's rows() x pivots, undefined above the diagonal
+  std::vector<Eigen::VectorXd> stacks_;  // the updates that wait
 };
 
 }  // namespace dqslam

@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "dqslam/linear/parallel.h"
+
 namespace dqslam {
 namespace {
 
@@ -74,6 +76,14 @@ BlockMatrix::BlockMatrix(std::vector<int> sizes, const std::vector<std::pair<int
     start += std::ptrdiff_t{sizes_[i]} * sizes_[j];
   }
   values_.assign(start, 0.0);
+}
+
+void BlockMatrix::SetZero(int threads) {
+  constexpr std::ptrdiff_t kPart = 1 << 18;
+  const auto size = static_cast<std::ptrdiff_t>(values_.size());
+  ParallelForParts(threads, size, kPart, [this](std::ptrdiff_t begin, std::ptrdiff_t end) {
+    std::fill(values_.begin() + begin, values_.begin() + end, 0.0);
+  });
 }
 
 Eigen::VectorXd BlockMatrix::diagonal() const {

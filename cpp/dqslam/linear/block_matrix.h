@@ -2,7 +2,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <algorithm>
 #include <cstddef>
 #include <utility>
 #include <vector>
@@ -43,7 +42,7 @@ class BlockMatrix {
   double* OffDiagonal(int index) { return values_.data() + off_diagonal_start_[index]; }
   const double* OffDiagonal(int index) const { return values_.data() + off_diagonal_start_[index]; }
 
-  void SetZero() { std::fill(values_.begin(), values_.end(), 0.0); }
+  void SetZero(int threads = 1);
   Eigen::VectorXd diagonal() const;
   /// A x.
   Eigen::VectorXd Multiply(const Eigen::VectorXd& x) const;

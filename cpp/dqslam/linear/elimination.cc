@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <numeric>
 
+#include "dqslam/linear/dense_front.h"
 #include "dqslam/linear/front_tree.h"
 
 namespace dqslam {
@@ -30,10 +31,7 @@ class Layout {
       start_.push_back(start_.back() + A.size(tree.order[k]));
     }
     SortBlocks();
-    stack_.resize(tree.num_fronts());
-    for (int front = tree.num_fronts() - 1; front >= 0; --front) {
-      stack_[front] = tree.parent[front] < 0 ? 0 : 1 - stack_[tree.parent[front]];
-    }
+    ChooseStacks();
   }
 
   void PlaceRows() {
@@ -58,6 +56,7 @@ class Layout {
     for (const int index : blocks_[f]) AddBlock(index);
     for (const int child : children_[f]) AddChild(child);
     factor_size_ += std::ptrdiff_t{front.rows()} * front.pivots;
+    if (ends_subtree_[f]) factor_size_ += kFrontPadding;
     PlaceUpdate(f, front);
     out_.fronts.push_back(front);
   }
@@ -85,6 +84,31 @@ class Layout {
       const auto [i, j] = A_.coupled(index);
       blocks_[front_of[std::min(position_[i], position_[j])]].push_back(index);
     }
+  }
+
+  // A front and its children alternate between the two stacks of their subtree.
+  void ChooseStacks() {
+    const int fronts = tree_.num_fronts();
+    std::vector<double> cost;
+    for (int f = 0; f < fronts; ++f) {
+      const double pivots = start_[tree_.first[f + 1]] - start_[tree_.first[f]];
+      double rows = pivots;
+      for (const int k : tree_.below[f]) rows += Size(k);
+      cost.push_back(pivots * rows * rows / 2);
+    }
+    out_.subtrees = SplitTree(tree_.parent, cost);
+    stack_.assign(fronts, 0);
+    ends_subtree_.assign(fronts, false);
+    for (size_t s = 0; s < out_.subtrees.size(); ++s) {
+      const auto [begin, end] = out_.subtrees[s];
+      std::fill(stack_.begin() + begin, stack_.begin() + end, 2 * static_cast<int>(s + 1));
+      ends_subtree_[end - 1] = true;
+    }
+    for (int f = fronts - 1; f >= 0; --f) {
+      if (tree_.parent[f] >= 0) stack_[f] += 1 - stack_[tree_.parent[f]] % 2;
+    }
+    out_.stack_size.assign(2 * (out_.subtrees.size() + 1), 0);
+    stack_top_ = out_.stack_size;
   }
 
   Front Begin() const {
@@ -121,13 +145,16 @@ class Layout {
     }
   }
 
-  // The updates of a front's children are on top of their stack, because of all updates that wait
-  // they were formed last. The front's own update goes to the other stack, so it needs no copy.
+  // The updates of a front's children in its subtree are on top of their stack, because of all
+  // updates that wait there they were formed last. The front's own update goes to the other stack,
+  // so it needs no copy.
   void PlaceUpdate(int f, Front& front) {
     front.stack = stack_[f];
-    if (!children_[f].empty()) {
-      stack_top_[1 - front.stack] = out_.fronts[children_[f].front()].update;
-    }
+    const int of_children = front.stack ^ 1;
+    const auto first = std::find_if(children_[f].begin(), children_[f].end(), [&](int child) {
+      return stack_[child] == of_children;
+    });
+    if (first != children_[f].end()) stack_top_[of_children] = out_.fronts[*first].update;
     std::ptrdiff_t& top = stack_top_[front.stack];
     front.update = top;
     top += std::ptrdiff_t{front.below} * front.below;
@@ -142,8 +169,10 @@ class Layout {
   std::vector<int> start_ = {0};  // first row at each position, in the order of elimination
   std::vector<int> at_;           // row within the front at hand where a position begins
   std::vector<int> stack_;        // of each front
-  Lists blocks_;                  // of each front, as in PlacedBlock::index
-  std::ptrdiff_t factor_size_ = 0, stack_top_[2] = {0, 0};
+  std::vector<bool> ends_subtree_;
+  Lists blocks_;  // of each front, as in PlacedBlock::index
+  std::ptrdiff_t factor_size_ = 0;
+  std::vector<std::ptrdiff_t> stack_top_;
 };
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "dqslam/linear/block_matrix.h"
+#include "dqslam/linear/subtrees.h"
 
 namespace dqslam {
 
@@ -18,7 +19,10 @@ struct Front {
   /// The first of its rows, blocks and children in the lists of Elimination. They end where those
   /// of the next front begin.
   int row, block, child;
-  int stack;  ///< 0 or 1, the stack of its update; the updates of its children are on the other
+  /// The stack of its update: 2 s or 2 s + 1 for a front of subtree s - 1, and 0 or 1 for a front
+  /// of no subtree.  The updates of its children are on the other of the two, or on that of a
+  /// subtree.
+  int stack;
   std::ptrdiff_t update;  ///< start on that stack: below x below, column-major, lower triangle
   std::ptrdiff_t factor;  ///< start in the factor: rows() x pivots, column-major
 
@@ -56,7 +60,8 @@ struct Elimination {
   std::vector<PlacedBlock> blocks;
   std::vector<Child> children;  ///< ascending; the last entry only marks the end
   std::vector<RowRun> runs;
-  std::ptrdiff_t stack_size[2] = {0, 0};
+  std::vector<Subtree> subtrees;  ///< these share neither stacks nor columns
+  std::vector<std::ptrdiff_t> stack_size;
 };
 
 }  // namespace dqslam

@@ -2,6 +2,9 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
+#include <unordered_map>
+#include <vector>
 
 #include "dqslam/linear/block_matrix.h"
 
@@ -18,7 +21,12 @@ struct NormalEquations {
 /// skipped.
 class Accumulator {
  public:
-  explicit Accumulator(NormalEquations* equations) : equations_(*equations), H_(equations_.H) {}
+  explicit Accumulator(NormalEquations* equations)
+      : Accumulator(equations, 0, equations->H.num_blocks()) {}
+  /// Of the blocks on the diagonal, it writes only to those from `begin` to before `end`, so that
+  /// others can add to the rest in the meantime.  What it adds to the rest waits for AddWaiting().
+  Accumulator(NormalEquations* equations, int begin, int end)
+      : equations_(*equations), H_(equations_.H), begin_(begin), end_(end) {}
 
   /// Adds J^T J and J^T r of one block. lazyProduct avoids the copy of a 4 x 9 operand that
   /// Eigen's usual product makes.
@@ -27,8 +35,14 @@ class Accumulator {
                    const Eigen::Matrix<double, kRows, kColumns>& J,
                    const Eigen::Matrix<double, kRows, 1>& residual) {
     if (block < 0) return;
-    equations_.gradient.segment<kColumns>(H_.offset(block)).noalias() += J.transpose() * residual;
-    Eigen::Map<Eigen::Matrix<double, kColumns, kColumns>>(H_.Diagonal(block)).noalias() +=
+    double* gradient = equations_.gradient.data() + H_.offset(block);
+    double* diagonal = H_.Diagonal(block);
+    if (block < begin_ || block >= end_) {
+      gradient = Waiting(block);
+      diagonal = gradient + kColumns;
+    }
+    Eigen::Map<Eigen::Matrix<double, kColumns, 1>>(gradient).noalias() += J.transpose() * residual;
+    Eigen::Map<Eigen::Matrix<double, kColumns, kColumns>>(diagonal).noalias() +=
         J.transpose().lazyProduct(J);
   }
 
@@ -42,9 +56,37 @@ class Accumulator {
         J_a.transpose() * J_b;
   }
 
+  /// Adds what waits, in the order in which the blocks came first.  Nothing waits any more.
+  void AddWaiting() {
+    for (const int block : waiting_blocks_) {
+      const int size = H_.size(block);
+      const double* gradient = &waiting_[start_of_[block]];
+      for (int i = 0; i < size; ++i) equations_.gradient[H_.offset(block) + i] += gradient[i];
+      const double* diagonal = gradient + size;
+      for (int i = 0; i < size * size; ++i) H_.Diagonal(block)[i] += diagonal[i];
+    }
+    waiting_blocks_.clear();
+    start_of_.clear();
+    waiting_.clear();
+  }
+
  private:
+  double* Waiting(int block) {
+    const auto [entry, is_new] = start_of_.try_emplace(block, waiting_.size());
+    if (is_new) {
+      waiting_blocks_.push_back(block);
+      const size_t size = H_.size(block);
+      waiting_.resize(waiting_.size() + size * (size + 1));
+    }
+    return &waiting_[entry->second];
+  }
+
   NormalEquations& equations_;
   BlockMatrix& H_;
+  int begin_, end_;
+  std::vector<int> waiting_blocks_;
+  std::unordered_map<int, size_t> start_of_;  // of a block in waiting_
+  std::vector<double> waiting_;               // the gradient of each block, then its diagonal
 };
 
 }  // namespace dqslam

@@ -89,6 +89,9 @@ struct SolveOptions {
   double grow_tolerance = 1e-2;
   /// Growing starts an object when it has this number of boxes.  The last addition starts all.
   int grow_min_views = 8;
+  /// The most threads that work at a time.  The result has the same bits with any number.  Ceres
+  /// uses one.
+  int threads = 1;
 };
 
 /// Called once an iteration; false asks to stop.

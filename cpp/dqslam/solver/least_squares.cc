@@ -1,13 +1,17 @@
 #include "dqslam/solver/least_squares.h"
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include "dqslam/geometry/dispatch.h"
+#include "dqslam/linear/parallel.h"
 #include "dqslam/solver/linearize.h"
 #include "dqslam/solver/loss.h"
 #include "dqslam/solver/retraction.h"
+#include "dqslam/solver/term_chunks.h"
 
 namespace dqslam {
 namespace {
@@ -72,12 +76,16 @@ class StageProblem : public LeastSquares {
   StageProblem(const PreparedGraph& prepared,
                std::unique_ptr<ceres::LossFunction> loss,
                StageTerms terms,
-               Pattern pattern)
+               std::vector<TermChunk> chunks,
+               Pattern pattern,
+               int threads)
       : LeastSquares(std::move(pattern.H)),
         prepared_(prepared),
         loss_(std::move(loss)),
         terms_(std::move(terms)),
-        off_diagonal_(std::move(pattern.off_diagonal)) {}
+        chunks_(std::move(chunks)),
+        off_diagonal_(std::move(pattern.off_diagonal)),
+        threads_(threads) {}
 
   VectorXd Pack(const State& state) const override { return terms_.variables.Pack(state); }
   void Unpack(const VectorXd& values, State* state) const override {
@@ -98,27 +106,67 @@ class StageProblem : public LeastSquares {
   }
 
   bool Linearize(const VectorXd& values) override {
-    equations_.H.SetZero();
+    equations_.H.SetZero(threads_);
     equations_.gradient.setZero(equations_.H.rows());
-    Accumulator accumulator(&equations_);
-    return Add<true>(values, &accumulator, &equations_.cost);
+    return Add<true>(values, &equations_, &equations_.cost);
   }
 
  private:
-  // Visits all terms.  Returns false where one is undefined.
+  // Visits all terms: the chunks in parallel, then the others.  The sums over chunks are in their
+  // order, whatever the number of threads.  Returns false where a term is undefined.
   template <bool kDerivatives>
-  bool Add(const VectorXd& values, Accumulator* equations, double* cost) const {
+  bool Add(const VectorXd& values, NormalEquations* equations, double* cost) const {
+    const LinearizedStage stage{prepared_, terms_, loss_.get(), off_diagonal_};
+    const UnpackedObjects objects(terms_, values);
+    const int num_chunks = static_cast<int>(chunks_.size());
+    std::vector<double> costs(num_chunks);
+    std::vector<char> defined(num_chunks);
+    std::vector<Accumulator> accumulators;
+    for (const TermChunk& chunk : chunks_) {
+      if (kDerivatives) accumulators.push_back(AccumulatorOf(chunk, equations));
+    }
+    ParallelFor(threads_, num_chunks, [&](int c) {
+      const TermChunk& chunk = chunks_[c];
+      Linearizer<Pose, kDerivatives> linearizer(stage,
+                                                values,
+                                                objects,
+                                                chunk.first_pose,
+                                                chunk.end_pose,
+                                                kDerivatives ? &accumulators[c] : nullptr);
+      linearizer.Skip(chunk.odometry.begin);
+      bool all = VisitOdometry<Pose>(prepared_, terms_, chunk.odometry, &linearizer);
+      linearizer.Skip(terms_.odometry.size() + chunk.boxes.begin);
+      all = all && VisitBoxes(terms_, chunk.boxes, &linearizer);
+      defined[c] = all;
+      costs[c] = linearizer.cost();
+    });
+    if (std::count(defined.begin(), defined.end(), true) < num_chunks) return false;
+    for (Accumulator& accumulator : accumulators) accumulator.AddWaiting();
+
+    std::optional<Accumulator> rest;
+    if (kDerivatives) rest.emplace(equations);
     Linearizer<Pose, kDerivatives> linearizer(
-        prepared_, terms_, loss_.get(), off_diagonal_, values, equations);
-    const bool defined = VisitTerms<Pose, EllipsoidModel>(prepared_, terms_, &linearizer);
+        stage, values, objects, 0, 0, rest ? &*rest : nullptr);
+    for (const double of_chunk : costs) linearizer.AddCost(of_chunk);
+    linearizer.Skip(terms_.odometry.size() + terms_.boxes.size());
+    const bool all = VisitOtherTerms<Pose, EllipsoidModel>(prepared_, terms_, &linearizer);
     *cost = linearizer.cost();
-    return defined && std::isfinite(*cost);
+    return all && std::isfinite(*cost);
+  }
+
+  // It writes to the blocks of the poses of a chunk; a single chunk may write to all blocks.
+  Accumulator AccumulatorOf(const TermChunk& chunk, NormalEquations* equations) const {
+    if (chunks_.size() == 1) return Accumulator(equations);
+    const int first = terms_.variables.first_free_pose;
+    return {equations, std::max(chunk.first_pose - first, 0), std::max(chunk.end_pose - first, 0)};
   }
 
   const PreparedGraph& prepared_;
   const std::unique_ptr<ceres::LossFunction> loss_;
   const StageTerms terms_;
+  const std::vector<TermChunk> chunks_;
   const std::vector<int> off_diagonal_;
+  const int threads_;
 };
 
 }  // namespace
@@ -129,11 +177,14 @@ std::unique_ptr<LeastSquares> MakeLeastSquares(const SolveContext& context,
   StageTerms terms = SelectTerms(context, stage, state);
   return Dispatch(context.graph().pose_model, [&](auto pose) -> std::unique_ptr<LeastSquares> {
     using Pose = decltype(pose);
+    std::vector<TermChunk> chunks = SplitTerms(context.graph(), &terms);
     Pattern pattern = MakePattern<Pose>(context.prepared, terms);
     return std::make_unique<StageProblem<Pose>>(context.prepared,
                                                 MakeLoss(stage.loss, context.options),
                                                 std::move(terms),
-                                                std::move(pattern));
+                                                std::move(chunks),
+                                                std::move(pattern),
+                                                context.options.threads);
   });
 }
 

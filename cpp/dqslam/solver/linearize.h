@@ -56,44 +56,69 @@ bool LinearizeBox(const PreparedGraph& prepared,
   return true;
 }
 
-/// A visitor that adds up the terms at some values, with or without derivatives.
-template <typename Pose, bool kDerivatives>
-class Linearizer {
- public:
-  /// `loss` applies to whole boxes and is null for least squares.  `off_diagonal` lists the blocks
-  /// of H to which the terms of two blocks add, in the order of these terms.  `equations` is null
-  /// without derivatives.
-  Linearizer(const PreparedGraph& prepared,
-             const StageTerms& terms,
-             const ceres::LossFunction* loss,
-             const std::vector<int>& off_diagonal,
-             const Eigen::VectorXd& values,
-             Accumulator* equations)
-      : prepared_(prepared),
-        variables_(terms.variables),
-        loss_(loss),
-        off_diagonal_(off_diagonal.data()),
-        values_(values),
-        equations_(equations) {
-    stations_.reserve(variables_.num_poses());
-    for (int pose = variables_.first_pose; pose < variables_.end_pose; ++pose) {
-      stations_.push_back(Station::At<Pose>(ParametersOf(PoseRow{pose}).values, prepared.mount));
-    }
-    ellipsoids_.reserve(variables_.num_objects());
-    if (!terms.shapes.empty()) bodies_.resize(variables_.num_objects());
-    for (const int object : variables_.objects) {
-      const double* parameters = ParametersOf(ObjectRow{object}).values;
-      ellipsoids_.emplace_back(parameters);
+/// The objects of a stage at some values, by slot.
+struct UnpackedObjects {
+  UnpackedObjects(const StageTerms& terms, const Eigen::VectorXd& values) {
+    const VariableIndex& variables = terms.variables;
+    ellipsoids.reserve(variables.num_objects());
+    if (!terms.shapes.empty()) bodies.resize(variables.num_objects());
+    for (const int object : variables.objects) {
+      const double* parameters = &values[variables.Start(ObjectRow{object})];
+      ellipsoids.emplace_back(parameters);
       const Shape shape = ShapeOf(terms.shapes, object);
       if (shape != Shape::kEllipsoid) {
-        bodies_[variables_.slot_of_object[object]] =
+        bodies[variables.slot_of_object[object]] =
             Unpacked<BodyModel>(RoundedModel(shape), parameters);
       }
     }
   }
 
+  std::vector<Unpacked<EllipsoidModel>> ellipsoids;
+  std::vector<Unpacked<BodyModel>> bodies;  ///< empty if there are none
+};
+
+/// What linearization needs of a stage.
+struct LinearizedStage {
+  const PreparedGraph& prepared;
+  const StageTerms& terms;
+  const ceres::LossFunction* loss;  ///< of whole boxes; null for least squares
+  /// The blocks of H to which the terms of two blocks add, in the order of these terms.
+  const std::vector<int>& off_diagonal;
+};
+
+/// A visitor that adds up terms at some values, with or without derivatives.
+template <typename Pose, bool kDerivatives>
+class Linearizer {
+ public:
+  /// Visits boxes of the poses from `first_pose` to before `end_pose`.  `equations` is null without
+  /// derivatives.
+  Linearizer(const LinearizedStage& stage,
+             const Eigen::VectorXd& values,
+             const UnpackedObjects& objects,
+             int first_pose,
+             int end_pose,
+             Accumulator* equations)
+      : prepared_(stage.prepared),
+        variables_(stage.terms.variables),
+        loss_(stage.loss),
+        off_diagonals_(stage.off_diagonal),
+        off_diagonal_(off_diagonals_.data()),
+        values_(values),
+        objects_(objects),
+        first_pose_(first_pose),
+        equations_(equations) {
+    stations_.reserve(end_pose - first_pose);
+    for (int pose = first_pose; pose < end_pose; ++pose) {
+      stations_.push_back(Station::At<Pose>(ParametersOf(PoseRow{pose}).values, prepared_.mount));
+    }
+  }
+
+  /// Says that the next term of two blocks is that of this number among them.
+  void Skip(size_t number) { off_diagonal_ = off_diagonals_.data() + number; }
+
   /// Half the sum of the squared residuals so far, after the loss.
   double cost() const { return cost_; }
+  void AddCost(double cost) { cost_ += cost; }
 
   template <typename Cost, typename... Rows>
   bool Visit(const Cost& cost, const Rows&... rows) {
@@ -118,12 +143,12 @@ class Linearizer {
     Matrix<kBoxSize, kTangent> by_pose;
     Matrix<kBoxSize, kLandmarkSize> by_object;
     const auto linearize = [&](const auto& landmark) {
-      const Station& station = stations_[pose - variables_.first_pose];
+      const Station& station = stations_[pose - first_pose_];
       return LinearizeBox<Pose, kDerivatives>(
           prepared_, box, station, landmark, &residual, &by_pose, &by_object);
     };
-    if (!(box.shape == Shape::kEllipsoid ? linearize(ellipsoids_[slot])
-                                         : linearize(bodies_[slot]))) {
+    if (!(box.shape == Shape::kEllipsoid ? linearize(objects_.ellipsoids[slot])
+                                         : linearize(objects_.bodies[slot]))) {
       return false;
     }
     double rho[3] = {residual.squaredNorm(), 1, 0};
@@ -174,12 +199,13 @@ class Linearizer {
   const PreparedGraph& prepared_;
   const VariableIndex& variables_;
   const ceres::LossFunction* loss_;
+  const std::vector<int>& off_diagonals_;
   const int* off_diagonal_;  // of the next term of two blocks
   const Eigen::VectorXd& values_;
+  const UnpackedObjects& objects_;
+  int first_pose_;
   Accumulator* equations_;
-  std::vector<Station> stations_;                     // of all poses
-  std::vector<Unpacked<EllipsoidModel>> ellipsoids_;  // by slot
-  std::vector<Unpacked<BodyModel>> bodies_;           // by slot; empty if there are none
+  std::vector<Station> stations_;  // from first_pose_ on
   double cost_ = 0;
 };
 

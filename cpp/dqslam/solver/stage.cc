@@ -3,8 +3,10 @@
 #include <ceres/problem.h>
 
 #include "dqslam/costs/box_chi_square.h"
+#include "dqslam/linear/parallel.h"
 #include "dqslam/solver/ceres_backend.h"
 #include "dqslam/solver/ceres_problem.h"
+#include "dqslam/solver/stage_terms.h"
 #include "dqslam/solver/trust_region.h"
 #include "dqslam/solver/visit_object.h"
 
@@ -19,7 +21,8 @@ bool NeedsCeres(const SolveOptions& options, const Stage& stage) {
 }  // namespace
 
 Summary Optimize(const SolveContext& context, const Stage& stage, State* state) {
-  const TrustRegionOptions method{stage.minimizer, stage.max_iterations, stage.function_tolerance};
+  const TrustRegionOptions method{
+      stage.minimizer, stage.max_iterations, stage.function_tolerance, context.options.threads};
   Summary summary;
   if (NeedsCeres(context.options, stage)) {
     ceres::Problem problem;
@@ -37,17 +40,20 @@ Summary Optimize(const SolveContext& context, const Stage& stage, State* state) 
 Eigen::VectorXd BoxCosts(const SolveContext& context, const State& state) {
   const Graph& graph = context.graph();
   Eigen::VectorXd costs(graph.boxes.size());
-  for (int row = 0; row < graph.boxes.size(); ++row) {
-    const CameraInWorld<double> camera =
-        LocateCamera(context.prepared, state, graph.boxes.pose[row]);
-    VisitObject(context.options, state, graph.boxes.object[row], [&](const auto& in_world) {
-      costs[row] = 0.5 * BoxChiSquare(ToCamera(camera, in_world),
-                                      graph.camera,
-                                      graph.boxes.box.row(row),
-                                      graph.boxes.truncated.row(row),
-                                      context.prepared.box_sqrt_information[row]);
-    });
-  }
+  const auto evaluate = [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+    for (auto row = static_cast<int>(begin); row < end; ++row) {
+      const CameraInWorld<double> camera =
+          LocateCamera(context.prepared, state, graph.boxes.pose[row]);
+      VisitObject(context.options, state, graph.boxes.object[row], [&](const auto& in_world) {
+        costs[row] = 0.5 * BoxChiSquare(ToCamera(camera, in_world),
+                                        graph.camera,
+                                        graph.boxes.box.row(row),
+                                        graph.boxes.truncated.row(row),
+                                        context.prepared.box_sqrt_information[row]);
+      });
+    }
+  };
+  ParallelForParts(context.options.threads, costs.size(), kBoxesPerPart, evaluate);
   return costs;
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "dqslam/geometry/outline.h"
+#include "dqslam/linear/parallel.h"
 #include "dqslam/solver/visit_object.h"
 
 namespace dqslam {
@@ -60,7 +61,9 @@ StageTerms SelectTerms(const SolveContext& context, const Stage& stage, const St
   const Graph& graph = context.graph();
   StageTerms terms{IndexVariables(graph, stage), state.shapes, {}, {}, {}};
   VariableIndex& variables = terms.variables;
-  for (int row = 0; row < graph.odometry.size(); ++row) {
+  // Where no pose is free, no odometry is in the stage.
+  const int odometry = variables.num_free_poses() > 0 ? graph.odometry.size() : 0;
+  for (int row = 0; row < odometry; ++row) {
     const auto [earlier, later] = std::minmax(graph.odometry.from[row], graph.odometry.to[row]);
     if (later < stage.first_free_pose || later >= stage.end_pose) continue;
     variables.first_pose = std::min<int>(variables.first_pose, earlier);
@@ -71,11 +74,16 @@ StageTerms SelectTerms(const SolveContext& context, const Stage& stage, const St
     const int row = stage.boxes[i];
     const double weight = stage.weights.empty() ? 1.0 : stage.weights[i];
     if (weight == 0) continue;
-    terms.boxes.push_back({row,
-                           weight,
-                           ChooseResidual(context, stage, state, row),
-                           ShapeOf(state.shapes, graph.boxes.object[row])});
+    terms.boxes.push_back({row, weight, {}, ShapeOf(state.shapes, graph.boxes.object[row])});
   }
+  const auto choose = [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+    for (std::ptrdiff_t i = begin; i < end; ++i) {
+      StageBox& box = terms.boxes[i];
+      box.residual = ChooseResidual(context, stage, state, box.row);
+    }
+  };
+  const auto num_boxes = static_cast<std::ptrdiff_t>(terms.boxes.size());
+  ParallelForParts(context.options.threads, num_boxes, kBoxesPerPart, choose);
   for (const MeasurementTable& table : graph.measurements) {
     std::vector<int>& rows = terms.measurements.emplace_back();
     for (int row = 0; row < table.size(); ++row) {

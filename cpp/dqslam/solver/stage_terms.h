@@ -1,12 +1,16 @@
 // The terms of a stage, as rows of the tables of the graph.  They are fixed while the stage runs.
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 #include "dqslam/solver/stage.h"
 #include "dqslam/solver/variables.h"
 
 namespace dqslam {
+
+/// The number of boxes that a thread evaluates at a time: about half a millisecond of work.
+inline constexpr int kBoxesPerPart = 4096;
 
 /// The residual that a box has in a stage.
 struct BoxResidual {
@@ -22,12 +26,22 @@ struct StageBox {
   Shape shape = Shape::kEllipsoid;  ///< of its object
 };
 
+/// Some of a list of terms: from `begin` to before `end`.
+struct TermRange {
+  size_t begin, end;
+
+  size_t size() const { return end - begin; }
+};
+
 struct StageTerms {
   VariableIndex variables;
   std::vector<Shape> shapes;  ///< of all objects; if empty, all are ellipsoids
   std::vector<int> odometry;  ///< rows
   std::vector<StageBox> boxes;
   std::vector<std::vector<int>> measurements;  ///< rows, one list a table
+
+  TermRange all_odometry() const { return {0, odometry.size()}; }
+  TermRange all_boxes() const { return {0, boxes.size()}; }
 };
 
 /// The terms of a stage, with their poses and objects.  A box whose residual is undefined at

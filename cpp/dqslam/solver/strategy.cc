@@ -126,9 +126,9 @@ bool Strategy::StepWithoutLimit(const NormalEquations& equations, VectorXd* step
   return Solve(equations, kLeastDamping * Curvature(equations), step);
 }
 
-std::unique_ptr<Strategy> MakeStrategy(Minimizer minimizer, const BlockMatrix& H) {
-  if (minimizer == Minimizer::kDogleg) return std::make_unique<Dogleg>(H, kLargestRadius);
-  return std::make_unique<LevenbergMarquardt>(H, kDampedRadius);
+std::unique_ptr<Strategy> MakeStrategy(Minimizer minimizer, const BlockMatrix& H, int threads) {
+  if (minimizer == Minimizer::kDogleg) return std::make_unique<Dogleg>(H, kLargestRadius, threads);
+  return std::make_unique<LevenbergMarquardt>(H, kDampedRadius, threads);
 }
 
 }  // namespace dqslam

@@ -17,7 +17,8 @@ constexpr double kPoorGain = 0.25, kGoodGain = 0.75;
 /// The state of a trust region, with the factorization behind its steps.
 class Strategy {
  public:
-  Strategy(const BlockMatrix& H, double radius) : radius_(radius), cholesky_(H) {}
+  Strategy(const BlockMatrix& H, double radius, int threads)
+      : radius_(radius), cholesky_(H, threads) {}
   virtual ~Strategy() = default;
   /// Computes the step.  `is_new` is false if the equations are those of the last call.  Returns
   /// false where there is no step.
@@ -49,6 +50,6 @@ class Strategy {
 };
 
 /// Makes a strategy for matrices with the pattern of `H`.
-std::unique_ptr<Strategy> MakeStrategy(Minimizer minimizer, const BlockMatrix& H);
+std::unique_ptr<Strategy> MakeStrategy(Minimizer minimizer, const BlockMatrix& H, int threads);
 
 }  // namespace dqslam

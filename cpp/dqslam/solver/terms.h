@@ -161,21 +161,38 @@ bool VisitPlacements(const Graph& graph, const StageTerms& terms, Visitor* visit
   return true;
 }
 
-/// Visits all terms.  Returns false where a visit returned false.
-template <typename Pose, typename Landmark, typename Visitor>
-bool VisitTerms(const PreparedGraph& prepared, const StageTerms& terms, Visitor* visitor) {
-  const Graph& graph = prepared.graph;
-  for (const int row : terms.odometry) {
+/// Visits some odometry.  Returns false where a visit returned false.
+template <typename Pose, typename Visitor>
+bool VisitOdometry(const PreparedGraph& prepared,
+                   const StageTerms& terms,
+                   TermRange range,
+                   Visitor* visitor) {
+  const OdometryTable& odometry = prepared.graph.odometry;
+  for (size_t i = range.begin; i < range.end; ++i) {
+    const int row = terms.odometry[i];
     using Square = Eigen::Matrix<double, Pose::kTangentSize, Pose::kTangentSize>;
     const OdometryCost<Pose> cost{{},
-                                  graph.odometry.relative.row(row).transpose(),
+                                  odometry.relative.row(row).transpose(),
                                   Square(prepared.odometry_sqrt_information[row])};
-    const PoseRow from{graph.odometry.from[row]}, to{graph.odometry.to[row]};
+    const PoseRow from{odometry.from[row]}, to{odometry.to[row]};
     if (!visitor->Visit(cost, from, to)) return false;
   }
-  for (const StageBox& box : terms.boxes) {
-    if (!visitor->VisitBox(box)) return false;
+  return true;
+}
+
+/// Visits some boxes.  Returns false where a visit returned false.
+template <typename Visitor>
+bool VisitBoxes(const StageTerms& terms, TermRange range, Visitor* visitor) {
+  for (size_t i = range.begin; i < range.end; ++i) {
+    if (!visitor->VisitBox(terms.boxes[i])) return false;
   }
+  return true;
+}
+
+/// Visits all terms but odometry and boxes.  Returns false where a visit returned false.
+template <typename Pose, typename Landmark, typename Visitor>
+bool VisitOtherTerms(const PreparedGraph& prepared, const StageTerms& terms, Visitor* visitor) {
+  const Graph& graph = prepared.graph;
   for (size_t t = 0; t < terms.measurements.size(); ++t) {
     const MeasurementTable& table = graph.measurements[t];
     const bool defined =
@@ -227,6 +244,14 @@ bool VisitTerms(const PreparedGraph& prepared, const StageTerms& terms, Visitor*
     }
     return true;
   });
+}
+
+/// Visits all terms: odometry, boxes, then the others.  Returns false where a visit returned false.
+template <typename Pose, typename Landmark, typename Visitor>
+bool VisitTerms(const PreparedGraph& prepared, const StageTerms& terms, Visitor* visitor) {
+  return VisitOdometry<Pose>(prepared, terms, terms.all_odometry(), visitor) &&
+         VisitBoxes(terms, terms.all_boxes(), visitor) &&
+         VisitOtherTerms<Pose, Landmark>(prepared, terms, visitor);
 }
 
 }  // namespace dqslam

@@ -116,7 +116,7 @@ Summary Minimize(const TrustRegionOptions& options,
   std::unique_ptr<Strategy> strategy;
   {
     const Stopwatch linear_solver(&summary.linear_solver_seconds);
-    strategy = MakeStrategy(options.minimizer, equations.H);
+    strategy = MakeStrategy(options.minimizer, equations.H, options.threads);
   }
   // Stops because no step is short enough.  That is a minimum only if the model sees no decrease.
   const auto stop_short = [&](std::string message) {

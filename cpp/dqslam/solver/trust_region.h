@@ -12,6 +12,7 @@ struct TrustRegionOptions {
   Minimizer minimizer = Minimizer::kLevenbergMarquardt;
   int max_iterations = 100;
   double function_tolerance = 1e-10;
+  int threads = 1;  ///< of the factorization
 };
 
 /// Minimizes from `values` and writes the result there.  Throws Interrupted.

@@ -151,6 +151,10 @@ def run(
             help="Share of boxes that the estimator does not use, to test the map.",
         ),
     ] = 0.0,
+    threads: Annotated[
+        int,
+        typer.Option(min=1, help="Threads of the solver. The result is the same with any number."),
+    ] = 1,
     online: Annotated[
         bool,
         typer.Option("--online", help="Replay the recording step by step, and polish at the end."),
@@ -220,6 +224,7 @@ def run(
         estimate=split_names(estimate),
         hold_out=hold_out,
         seed=seed,
+        threads=threads,
         min_score=min_score,
         extras=io.Extras(positions=positions, absolute=absolute, closures=closures),
         reading=replace(reading, max_bad=0.0) if strict else reading,

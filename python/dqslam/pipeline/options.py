@@ -55,12 +55,16 @@ class RunOptions:
     """Share of the boxes, at least 0 and below 1, that the map is tested on instead."""
     seed: int = 0
     """Seed of the random choice of these boxes."""
+    threads: int = 1
+    """The most threads of the solver, at least 1; the result is the same with any number."""
     watch: Watch | None = None
     """Called after each step of a session; if the calibration is estimated, in each replay."""
 
     def solve_options(self) -> _core.SolveOptions:
         """Return the solver's options: its loss forgives boxes that show something else."""
-        return _core.SolveOptions(mode=self.mode, loss=_core.Loss.CAUCHY, loss_scale=2.0)
+        return _core.SolveOptions(
+            mode=self.mode, loss=_core.Loss.CAUCHY, loss_scale=2.0, threads=self.threads
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
