@@ -13,7 +13,7 @@ import typer
 
 import dqslam
 from dqslam._version import version
-from dqslam.cli import app
+from dqslam.cli import app, main
 
 COMMANDS = typer.main.get_command(app).commands
 SOURCE = str(Path(dqslam.__file__).parents[1])
@@ -42,6 +42,31 @@ def test_nothing_is_cut_at_80_columns(name):
         for option in (*parameter.opts, *parameter.secondary_opts):
             if option.startswith("-"):
                 assert option in shown.stdout
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_all_of_a_help_is_shown(name, capsys, monkeypatch):
+    """Nothing is taken for markup, and a sentence goes on over the lines of its docstring."""
+    monkeypatch.setenv("COLUMNS", "500")
+    assert main([name, "-h"]) == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    for paragraph in COMMANDS[name].help.split("\n\n"):
+        assert " ".join(paragraph.split()) in shown
+    for parameter in COMMANDS[name].params:
+        if not getattr(parameter, "hidden", False):
+            assert parameter.help in shown
+    assert "<" not in shown.replace("<=", "")  # no types of Python
+
+
+def test_a_switch_has_no_value():
+    words = {"-q": "", "--out": "DIR", "--jobs": "N", "--groundtruth": "PATH", "--ids": "SOURCE"}
+    context = typer.Context(COMMANDS["run"])
+    found = {one.opts[-1]: one.metavar for one in COMMANDS["run"].get_params(context)}
+    found |= {one.opts[0]: one.metavar for one in COMMANDS["run"].params}
+    found |= {one.opts[0]: one.metavar for one in COMMANDS["batch"].get_params(context)}
+    assert {name: found[name] for name in words} == words
+    assert found["--mode"] == "slam|mapping"
+    assert found["--backend"] == "serial | processes | loky | dask | ray"
 
 
 def test_the_module_is_the_program():

@@ -1,5 +1,6 @@
 """The output of ``dqslam run``: a report as tables and lines."""
 
+import math
 from typing import TYPE_CHECKING, Any
 
 from dqslam.cli.output import Output
@@ -77,7 +78,7 @@ def _overview(report: dict[str, Any]) -> "Table":
     table.add_row("left out", _left_out(report["dropped_boxes"], report["ids"]))
     if boxes["count"]:
         table.add_row(
-            "chi-square of a box",
+            "χ² of a box",
             f"median {boxes['chi2_median']:.2f} (3.36 expected); {boxes['outlier_share']:.1%} do "
             f"not fit (above 13.28), {boxes['not_in_front']} of them not even in front",
         )
@@ -170,8 +171,8 @@ def _objects(objects: list[dict[str, Any]]) -> "Table":
     from rich.markup import escape
     from rich.table import Table
 
-    table = Table(box=SIMPLE_HEAD)
-    headings = ["id", "class", "boxes", "center [m]", "± [m]", "size [m]", "chi-square", "outliers"]
+    table = Table(box=SIMPLE_HEAD, padding=0)
+    headings = ["id", "class", "boxes", "center, m", "±, m", "size, m", "χ²", "outliers"]
     has_shapes = any(entry["shape"] not in (None, "ellipsoid") for entry in objects)
     if has_shapes:
         headings.insert(6, "shape")
@@ -183,7 +184,7 @@ def _objects(objects: list[dict[str, Any]]) -> "Table":
             str(entry["id"]) if entry["doubt"] is None else f"{entry['id']} ?",
             escape(entry["class_name"]),
             str(entry["observations"]),
-            " ".join(f"{value:.3g}" for value in entry["center_m"]),
+            _center(entry["center_m"], sigma),
             "unknown" if sigma is None else f"{sigma:.2g}",
             "unknown" if None in axes else " x ".join(f"{2.0 * axis:.2g}" for axis in axes),
             *([entry["shape"] or "none"] if has_shapes else []),
@@ -193,15 +194,23 @@ def _objects(objects: list[dict[str, Any]]) -> "Table":
     return table
 
 
+def _center(center: list[float], sigma: float | None) -> str:
+    """Return a center with the digits that its sigma leaves, or those of a centimeter."""
+    digits = 2
+    if sigma is not None and sigma > 0.0:
+        digits = min(max(math.ceil(-math.log10(sigma)), 0), 4)
+    return " ".join(f"{value:.{digits}f}" for value in center)
+
+
 def _moving(moving: list[dict[str, Any]]) -> "Table":
     from rich.box import SIMPLE_HEAD
     from rich.markup import escape
     from rich.table import Table
 
-    table = Table(box=SIMPLE_HEAD, title="what moves")
+    table = Table(box=SIMPLE_HEAD, padding=0, title="what moves")
     headings = (
-        *("track", "class", "does", "images", "from [s]", "to [s]"),
-        *("path [m]", "speed [m/s]", "±", "size [m]"),
+        *("track", "class", "does", "images", "from, s", "to, s"),
+        *("path, m", "speed,\nm/s", "±", "size, m"),
     )
     for heading in headings:
         table.add_column(heading, justify="left" if heading in ("class", "does") else "right")
@@ -211,8 +220,8 @@ def _moving(moving: list[dict[str, Any]]) -> "Table":
             escape(one["class_name"]),
             one["behavior"],
             str(one["images"]),
-            f"{one['first_s']:.6g}",
-            f"{one['last_s']:.6g}",
+            f"{one['first_s']:.2f}",
+            f"{one['last_s']:.2f}",
             f"{one['length_of_path_m']:.3g}",
             f"{one['speed_median_m_s']:.2g}",
             f"{one['speed_sigma_m_s']:.2g}",

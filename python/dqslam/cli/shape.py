@@ -169,7 +169,7 @@ def _table(found: "Surfaces") -> "Table":
     from rich.table import Table
 
     table = Table(box=SIMPLE_HEAD)
-    for name in ("id", "class", "images", "voxel [mm]", "faces", "volume [l]", "extents [m]"):
+    for name in ("id", "class", "images", "voxel, mm", "faces", "volume, l", "extents, m"):
         table.add_column(name, justify="left" if name == "class" else "right")
     table.add_column("seen", justify="right")
     for one in found.surfaces:
