@@ -1,6 +1,5 @@
 """The output of ``dqslam run``: a report as tables and lines."""
 
-import math
 from typing import TYPE_CHECKING, Any
 
 from dqslam.cli.output import Output
@@ -171,7 +170,7 @@ def _objects(objects: list[dict[str, Any]]) -> "Table":
     from rich.markup import escape
     from rich.table import Table
 
-    table = Table(box=SIMPLE_HEAD, padding=0)
+    table = Table(box=SIMPLE_HEAD, padding=0, show_edge=False)
     headings = ["id", "class", "boxes", "center, m", "±, m", "size, m", "χ²", "outliers"]
     has_shapes = any(entry["shape"] not in (None, "ellipsoid") for entry in objects)
     if has_shapes:
@@ -184,9 +183,9 @@ def _objects(objects: list[dict[str, Any]]) -> "Table":
             str(entry["id"]) if entry["doubt"] is None else f"{entry['id']} ?",
             escape(entry["class_name"]),
             str(entry["observations"]),
-            _center(entry["center_m"], sigma),
+            " ".join(f"{value:.2f}" for value in entry["center_m"]),
             "unknown" if sigma is None else f"{sigma:.2g}",
-            "unknown" if None in axes else " x ".join(f"{2.0 * axis:.2g}" for axis in axes),
+            "unknown" if None in axes else "x".join(f"{2.0 * axis:.2g}" for axis in axes),
             *([entry["shape"] or "none"] if has_shapes else []),
             "none" if entry["chi2_median"] is None else f"{entry['chi2_median']:.2f}",
             "none" if entry["outlier_share"] is None else f"{entry['outlier_share']:.0%}",
@@ -194,20 +193,12 @@ def _objects(objects: list[dict[str, Any]]) -> "Table":
     return table
 
 
-def _center(center: list[float], sigma: float | None) -> str:
-    """Return a center with the digits that its sigma leaves, or those of a centimeter."""
-    digits = 2
-    if sigma is not None and sigma > 0.0:
-        digits = min(max(math.ceil(-math.log10(sigma)), 0), 4)
-    return " ".join(f"{value:.{digits}f}" for value in center)
-
-
 def _moving(moving: list[dict[str, Any]]) -> "Table":
     from rich.box import SIMPLE_HEAD
     from rich.markup import escape
     from rich.table import Table
 
-    table = Table(box=SIMPLE_HEAD, padding=0, title="what moves")
+    table = Table(box=SIMPLE_HEAD, padding=0, show_edge=False, title="what moves")
     headings = (
         *("track", "class", "does", "images", "from, s", "to, s"),
         *("path, m", "speed,\nm/s", "±", "size, m"),
@@ -225,6 +216,6 @@ def _moving(moving: list[dict[str, Any]]) -> "Table":
             f"{one['length_of_path_m']:.3g}",
             f"{one['speed_median_m_s']:.2g}",
             f"{one['speed_sigma_m_s']:.2g}",
-            " x ".join(f"{side:.2g}" for side in one["sides_m"]),
+            "x".join(f"{side:.2g}" for side in one["sides_m"]),
         )
     return table
