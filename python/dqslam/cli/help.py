@@ -21,6 +21,7 @@ class Command(TyperCommand):
 
     def get_params(self, ctx: Any) -> Any:
         """Return the parameters, each with a word for its value."""
+        assert self.callback is not None  # a command is made from its function
         return _worded(super().get_params(ctx), get_type_hints(inspect.unwrap(self.callback)))
 
 

@@ -13,11 +13,13 @@ def show_report(output: Output, report: dict[str, Any]) -> None:
     output.table(_overview(report))
     if report["objects"]:
         output.table(_objects(report["objects"]))
+        output.line("")
         if any(entry["doubt"] is not None for entry in report["objects"]):
             output.line("? the size or shape is not to be believed: see the warnings")
     tracks = report["tracks"]
     if tracks is not None and tracks["moving"]:
         output.table(_moving(tracks["moving"]))
+        output.line("")
     lines = [f"object {name} is not in the map: {why}" for name, why in _dropped(report)]
     lines += [f"under-constrained: {sentence}" for sentence in report["under_constrained"]]
     if report["solver"] is None:
