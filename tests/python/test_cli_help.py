@@ -17,8 +17,6 @@ from dqslam.cli import app, main
 
 COMMANDS = typer.main.get_command(app).commands
 SOURCE = str(Path(dqslam.__file__).parents[1])
-# What differs by command: which ids there are, what is written, where the page listens.
-DIFFER = {"--ids", "--objects"}  # the paper's objects are cubes or ellipsoids
 
 
 def run_module(*arguments, columns="80"):
@@ -88,8 +86,7 @@ def test_an_option_is_of_one_type_in_all_commands():
             for option in parameter.opts:
                 kinds[option][kind].append(name)
     assert len(kinds["--groundtruth"][frozenset({Path})]) == 4
-    differing = {option for option, found in kinds.items() if len(found) > 1}
-    assert differing <= DIFFER, {one: dict(kinds[one]) for one in differing - DIFFER}
+    assert {one: dict(found) for one, found in kinds.items() if len(found) > 1} == {}
 
 
 def test_what_is_written_is_said_by_o():

@@ -46,7 +46,7 @@ def shape(
     out: Annotated[
         Path | None,
         typer.Option(
-            "--out", "-o", metavar="OUT", help="Directory to write. Default: surfaces in DIR."
+            "--out", "-o", metavar="FOLDER", help="Directory to write. Default: surfaces in DIR."
         ),
     ] = None,
     positions: Annotated[
