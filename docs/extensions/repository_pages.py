@@ -72,7 +72,10 @@ class _Repository:
             page = folder / f"{name}.md"
             page.parent.mkdir(parents=True, exist_ok=True)
             show = self._list if path.is_dir() else self._show
-            page.write_text(f"---\norphan: true\n---\n\n# {name}\n\n{show(path, page)}")
+            # The search of the site finds pages, not lines of source.
+            page.write_text(
+                f"---\norphan: true\nno-search: true\n---\n\n# {name}\n\n{show(path, page)}"
+            )
 
     def _list(self, path: Path, page: Path) -> str:
         files = sorted(file for file in path.iterdir() if file in self.linked)
@@ -94,8 +97,8 @@ def _write_pages(app: Sphinx) -> None:
         page.parent.mkdir(exist_ok=True)
         text = (docs.parent / name).read_text(encoding="utf-8")
         page.write_text(repository.rewrite(text, docs.parent, page), encoding="utf-8")
-    for page in docs.glob("*.md"):
-        repository.rewrite(page.read_text(encoding="utf-8"), docs, page)
+    for page in (*docs.glob("*.md"), *docs.glob("api/*.md")):
+        repository.rewrite(page.read_text(encoding="utf-8"), page.parent, page)
     repository.write_pages(docs / "_generated/source")
 
 

@@ -45,7 +45,7 @@ def test_table_and_figure(tmp_path, capsys):
 
 def test_the_papers_method_shows_its_scan(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(methods, "ALGEBRAIC_SIGMAS", (1e10, 1e15))
-    command = ["paper", "--trials", "1", "--method", "paper", "--objects", "ellipsoids"]
+    command = ["paper", "--trials", "1", "--method", "paper", "--object-kind", "ellipsoids"]
     assert main([*command, "--out", str(tmp_path), "--jobs", "1"]) == 0
     table = json.loads((tmp_path / "table.json").read_text())
     assert (table["method"], table["objects"]) == ("paper", "ellipsoids")
@@ -104,7 +104,7 @@ def test_failures_are_shown(tmp_path, capsys, monkeypatch):
         (["--trials", "many"], "--trials"),
         (["--seed", "-1"], "--seed"),
         (["--jobs", "0"], "--jobs"),
-        (["--objects", "spheres"], "--objects"),
+        (["--object-kind", "spheres"], "--object-kind"),
         (["--method", "magic"], "--method"),
         (
             ["--scenario", "moon"],

@@ -87,11 +87,11 @@ def test_options_of_a_look_stand_beside_it(settings, tmp_path, capsys):
 
 
 def test_paper_and_its_configuration(tmp_path, capsys):
-    options = ["--trials", "1", "--seed", "6", "--jobs", "1", "--objects", "ellipsoids", "-q"]
+    options = ["--trials", "1", "--seed", "6", "--jobs", "1", "--object-kind", "ellipsoids", "-q"]
     assert main(["paper", *options, "--out", str(tmp_path / "a")]) == 0
     config = tmp_path / "a" / "config.toml"
     content = tomllib.loads(config.read_text())
-    assert (content["objects"], content["bound"], content["wrong_associations"]) == (
+    assert (content["object_kind"], content["bound"], content["wrong_associations"]) == (
         "ellipsoids",
         False,
         0.0,

@@ -113,11 +113,13 @@ def test_a_cost_is_known_to_few_files():
 
 
 def test_the_api_reference_has_every_public_name():
-    page = (ROOT / "docs/api.md").read_text()
-    documented = set(
-        re.findall(r"auto(?:class|data|function):: dqslam\.(\w+)$", page, flags=re.MULTILINE)
-    )
-    assert documented == set(dqslam.__all__) - {"__version__"}
+    """Each on one page, which the reference lists."""
+    pages = sorted((ROOT / "docs/api").glob("*.md"))
+    listed = re.findall(r"\]\(api/(\w+)\.md\)", (ROOT / "docs/api.md").read_text())
+    assert sorted(listed) == [page.stem for page in pages]
+    directive = re.compile(r"auto(?:class|data|function):: dqslam\.(\w+)$", flags=re.MULTILINE)
+    documented = [name for page in pages for name in directive.findall(page.read_text())]
+    assert sorted(documented) == sorted(set(dqslam.__all__) - {"__version__"})
 
 
 def test_the_citation_has_the_version():
@@ -149,6 +151,16 @@ def test_notebook(notebook, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+def searched(site):
+    """Return the pages whose words the search of a site finds."""
+    text = (site / "searchindex.js").read_text()
+    index = json.loads(text[text.index("{") : text.rindex("}") + 1])
+    rows = set()
+    for found in (*index["terms"].values(), *index["titleterms"].values()):
+        rows |= set(found) if isinstance(found, list) else {found}
+    return {index["docnames"][row] for row in rows}
+
+
 @pytest.mark.skipif(find_spec("sphinx_gallery") is None, reason="needs the extra docs")
 def test_the_site_is_built_without_a_warning(tmp_path):
     """On a copy, for the build writes into docs/."""
@@ -166,8 +178,13 @@ def test_the_site_is_built_without_a_warning(tmp_path):
     assert (site / "_images/paper_maps.png").is_file()
     assert "How sure is it?" in (site / "notebooks/boxes_to_map.html").read_text()
     assert (site / "_generated/source/cpp/dqslam/geometry/blocks.h.html").is_file()
+    assert 'id="dqslam.OnlineSlam"' in (site / "api/online.html").read_text()
+    found = searched(site)
+    assert "method" in found
+    assert not [page for page in found if page.startswith("_generated/source/")]
     for page in (
         *site.glob("*.html"),
+        *site.glob("api/*.html"),
         *site.glob("notebooks/*.html"),
     ):  # nothing is fetched from elsewhere
         fetched = r'<(?:script|img|iframe)[^>]* src="https?://|<link[^>]* href="https?://'

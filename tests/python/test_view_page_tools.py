@@ -245,6 +245,7 @@ def test_many_objects_and_poses(browser, results, tmp_path):
         shown = on_screen(page)
         assert 1000 < shown["estimate"] < 20_000
         assert 5_000 < shown["ellipsoids"] <= 10_000
+        assert shown["ellipsoids"] - shown["specks"] < 400  # with a shape of their own
         assert 50 < shown["labels"] <= 150
         assert page.locator("#objects button").count() == 300
         assert page.locator("#more").inner_text() == "and 9700 more: search for them"

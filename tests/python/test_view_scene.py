@@ -56,7 +56,8 @@ def test_numbers_are_those_of_the_evaluation(files):
     assert numbers[12]["orientation error"] == "10.0°"
     assert numbers[12]["true id"] == "12"
     assert numbers[99]["truth"] == "no true object matches"
-    assert (numbers[10]["boxes"], numbers[11]["boxes"]) == ("20, 0 fit", "20, 15 fit")
+    assert (numbers[10]["boxes"], numbers[11]["boxes"]) == ("20, 5 held out", "20, 5 held out")
+    assert (numbers[10]["fit"], numbers[11]["fit"]) == ("0 of 15 used", "15 of 15 used")
     assert numbers[10]["size"] == "0.160 × 0.100 × 0.060 m"
 
 

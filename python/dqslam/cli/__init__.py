@@ -25,6 +25,7 @@ from dqslam.cli.degeneracy import degeneracy
 from dqslam.cli.demo import demo
 from dqslam.cli.detect import detect
 from dqslam.cli.evaluate import evaluate
+from dqslam.cli.help import Command, Group
 from dqslam.cli.inspect import inspect
 from dqslam.cli.locate import locate
 from dqslam.cli.merge import merge
@@ -58,6 +59,7 @@ EXIT_CODES = {
 
 app = typer.Typer(
     name="dqslam",
+    cls=Group,
     epilog="Exit codes\n\n" + "\n".join(f"{code}: {why}" for code, why in EXIT_CODES.items()),
     no_args_is_help=True,
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -83,7 +85,7 @@ def _dqslam(
 
 for _panel, _commands in COMMANDS.items():
     for _command in _commands:
-        app.command(rich_help_panel=_panel)(_command)
+        app.command(rich_help_panel=_panel, cls=Command)(_command)
 
 _INTERRUPTED = 130
 _BAD_INPUT = 2

@@ -26,8 +26,8 @@ MotionOption = Annotated[
 SigmaOption = Annotated[
     float | None,
     typer.Option(
-        help="Error of a center [m] in maps without covariances. Default: a twentieth of the room "
-        "that an object has."
+        help="Error of a center in meters, in maps without covariances. Default: a twentieth of "
+        "the room that an object has."
     ),
 ]
 

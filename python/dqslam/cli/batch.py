@@ -24,7 +24,10 @@ DOUBTFUL, FAILED = 3, 4  # exit codes
 def batch(
     context: typer.Context,
     file: Annotated[
-        Path, typer.Argument(help="TOML file with recordings and the options of their runs.")
+        Path,
+        typer.Argument(
+            metavar="FILE", help="TOML file with recordings and the options of their runs."
+        ),
     ],
     out: ResultDirectory,
     jobs: Jobs = None,

@@ -102,7 +102,7 @@ def _table(found: "Changes") -> "Table":
     from dqslam.places.changes_files import distance_and_sigma
 
     table = Table(box=SIMPLE_HEAD)
-    for name in ("object", "class", "", "probability", "from [m]", "to [m]", "moved [m]", "looks"):
+    for name in ("object", "class", "", "probability", "from, m", "to, m", "moved, m", "looks"):
         table.add_column(name, justify="left" if name in ("class", "") else "right")
     for one in found.objects:
         ids = " ".join(

@@ -167,8 +167,9 @@ def _boxes_and_objects(evaluation: dict[str, Any]) -> "Table":
         ("IoU in space", "iou_3d", ("median", "mean")),
     )
     for title, name, wanted in rows:
-        values = (f"{which} {_number(objects[f'{name}_{which}'])}" for which in wanted)
-        table.add_row(title, ", ".join(values))
+        found = {which: objects[f"{name}_{which}"] for which in wanted}
+        known = [f"{which} {_number(value)}" for which, value in found.items() if value is not None]
+        table.add_row(title, ", ".join(known) or "unknown")
     return table
 
 

@@ -109,7 +109,7 @@ def _table(answers: "list[ImageLocation]") -> "Table":
     from rich.table import Table
 
     table = Table(box=SIMPLE_HEAD)
-    for name in ("time [s]", "boxes", "position [m]", "± [m]", "confidence", "no answer because"):
+    for name in ("time, s", "boxes", "position, m", "±, m", "confidence", "no answer because"):
         table.add_column(name, justify="left" if name == "no answer because" else "right")
     for one in answers[:MOST_LISTED]:
         found = one.location

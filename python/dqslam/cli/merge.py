@@ -13,7 +13,7 @@ from dqslam.cli.settings import CONFIG, ConfigFile, settings_text
 
 def merge(
     context: typer.Context,
-    maps: Annotated[list[Path], typer.Argument(metavar="A B [C ...]", help=MAP_HELP)],
+    maps: Annotated[list[Path], typer.Argument(metavar="MAP", help=MAP_HELP)],
     out: ResultDirectory,
     motion: MotionOption = "auto",
     sigma: SigmaOption = None,

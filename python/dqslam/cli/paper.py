@@ -57,7 +57,7 @@ def paper(
             "the assumptions of the estimator; or a TOML file like theirs.",
         ),
     ] = "paper",
-    objects: Annotated[
+    object_kind: Annotated[
         Literal["cubes", "ellipsoids"] | None,
         typer.Option(
             help="cubes, as in the paper; ellipsoids, without model error. Default: those of the "
@@ -120,7 +120,7 @@ def paper(
         "wrong_association_kind": wrong_association_kind or wrong_kind,
     }
     changes = {
-        "objects": objects or chosen.objects,
+        "objects": object_kind or chosen.objects,
         "detector": chosen.detector.model_copy(update=wrong),
     }
     output = Output(quiet=quiet, as_json=json)

@@ -42,7 +42,7 @@ def plot(
     out: Annotated[
         Path | None,
         typer.Option(
-            "--out", "-o", metavar="DIR", help="Directory of the figures. Default: DIR/figures."
+            "--out", "-o", metavar="FOLDER", help="Directory of the figures. Default: DIR/figures."
         ),
     ] = None,
     kind: Annotated[

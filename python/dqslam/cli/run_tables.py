@@ -13,11 +13,13 @@ def show_report(output: Output, report: dict[str, Any]) -> None:
     output.table(_overview(report))
     if report["objects"]:
         output.table(_objects(report["objects"]))
+        output.line("")
         if any(entry["doubt"] is not None for entry in report["objects"]):
             output.line("? the size or shape is not to be believed: see the warnings")
     tracks = report["tracks"]
     if tracks is not None and tracks["moving"]:
         output.table(_moving(tracks["moving"]))
+        output.line("")
     lines = [f"object {name} is not in the map: {why}" for name, why in _dropped(report)]
     lines += [f"under-constrained: {sentence}" for sentence in report["under_constrained"]]
     if report["solver"] is None:
@@ -77,7 +79,7 @@ def _overview(report: dict[str, Any]) -> "Table":
     table.add_row("left out", _left_out(report["dropped_boxes"], report["ids"]))
     if boxes["count"]:
         table.add_row(
-            "chi-square of a box",
+            "χ² of a box",
             f"median {boxes['chi2_median']:.2f} (3.36 expected); {boxes['outlier_share']:.1%} do "
             f"not fit (above 13.28), {boxes['not_in_front']} of them not even in front",
         )
@@ -170,8 +172,8 @@ def _objects(objects: list[dict[str, Any]]) -> "Table":
     from rich.markup import escape
     from rich.table import Table
 
-    table = Table(box=SIMPLE_HEAD)
-    headings = ["id", "class", "boxes", "center [m]", "± [m]", "size [m]", "chi-square", "outliers"]
+    table = Table(box=SIMPLE_HEAD, padding=0, show_edge=False)
+    headings = ["id", "class", "boxes", "center, m", "±, m", "size, m", "χ²", "outliers"]
     has_shapes = any(entry["shape"] not in (None, "ellipsoid") for entry in objects)
     if has_shapes:
         headings.insert(6, "shape")
@@ -183,9 +185,9 @@ def _objects(objects: list[dict[str, Any]]) -> "Table":
             str(entry["id"]) if entry["doubt"] is None else f"{entry['id']} ?",
             escape(entry["class_name"]),
             str(entry["observations"]),
-            " ".join(f"{value:.3g}" for value in entry["center_m"]),
+            " ".join(f"{value:.2f}" for value in entry["center_m"]),
             "unknown" if sigma is None else f"{sigma:.2g}",
-            "unknown" if None in axes else " x ".join(f"{2.0 * axis:.2g}" for axis in axes),
+            "unknown" if None in axes else "x".join(f"{2.0 * axis:.2g}" for axis in axes),
             *([entry["shape"] or "none"] if has_shapes else []),
             "none" if entry["chi2_median"] is None else f"{entry['chi2_median']:.2f}",
             "none" if entry["outlier_share"] is None else f"{entry['outlier_share']:.0%}",
@@ -198,10 +200,10 @@ def _moving(moving: list[dict[str, Any]]) -> "Table":
     from rich.markup import escape
     from rich.table import Table
 
-    table = Table(box=SIMPLE_HEAD, title="what moves")
+    table = Table(box=SIMPLE_HEAD, padding=0, show_edge=False, title="what moves")
     headings = (
-        *("track", "class", "does", "images", "from [s]", "to [s]"),
-        *("path [m]", "speed [m/s]", "±", "size [m]"),
+        *("track", "class", "does", "images", "from, s", "to, s"),
+        *("path, m", "speed,\nm/s", "±", "size, m"),
     )
     for heading in headings:
         table.add_column(heading, justify="left" if heading in ("class", "does") else "right")
@@ -211,11 +213,11 @@ def _moving(moving: list[dict[str, Any]]) -> "Table":
             escape(one["class_name"]),
             one["behavior"],
             str(one["images"]),
-            f"{one['first_s']:.6g}",
-            f"{one['last_s']:.6g}",
+            f"{one['first_s']:.2f}",
+            f"{one['last_s']:.2f}",
             f"{one['length_of_path_m']:.3g}",
             f"{one['speed_median_m_s']:.2g}",
             f"{one['speed_sigma_m_s']:.2g}",
-            " x ".join(f"{side:.2g}" for side in one["sides_m"]),
+            "x".join(f"{side:.2g}" for side in one["sides_m"]),
         )
     return table

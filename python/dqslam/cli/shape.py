@@ -46,7 +46,7 @@ def shape(
     out: Annotated[
         Path | None,
         typer.Option(
-            "--out", "-o", metavar="OUT", help="Directory to write. Default: surfaces in DIR."
+            "--out", "-o", metavar="FOLDER", help="Directory to write. Default: surfaces in DIR."
         ),
     ] = None,
     positions: Annotated[
@@ -169,7 +169,7 @@ def _table(found: "Surfaces") -> "Table":
     from rich.table import Table
 
     table = Table(box=SIMPLE_HEAD)
-    for name in ("id", "class", "images", "voxel [mm]", "faces", "volume [l]", "extents [m]"):
+    for name in ("id", "class", "images", "voxel, mm", "faces", "volume, l", "extents, m"):
         table.add_column(name, justify="left" if name == "class" else "right")
     table.add_column("seen", justify="right")
     for one in found.surfaces:

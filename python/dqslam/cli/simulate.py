@@ -21,7 +21,7 @@ def simulate(
     scenario: Annotated[
         str,
         typer.Argument(
-            metavar="[NAME|FILE]",
+            metavar="NAME|FILE",
             help="paper: a drive on the plane; orbit: hand-held, in space; honest and "
             "honest_orbit: the same, drawn from the assumptions of the estimator; a world of "
             "`dqslam worlds`; or a TOML file like theirs.",

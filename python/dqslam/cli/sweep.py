@@ -25,7 +25,10 @@ NAMED = 5  # number of failures of one kind that are named
 def sweep(
     context: typer.Context,
     file: Annotated[
-        Path, typer.Argument(help="TOML file with a scenario, seeds, and the settings to vary.")
+        Path,
+        typer.Argument(
+            metavar="FILE", help="TOML file with a scenario, seeds, and the settings to vary."
+        ),
     ],
     out: ResultDirectory,
     jobs: Jobs = None,

@@ -22,7 +22,7 @@ def worlds(
     names: Annotated[
         list[str] | None,
         typer.Argument(
-            metavar="[NAME|FILE]...", help="Worlds, or TOML files like theirs. Default: all."
+            metavar="NAME|FILE", help="Worlds, or TOML files like theirs. Default: all."
         ),
     ] = None,
     trials: Annotated[int, typer.Option(min=1, help="Seeds of each world.")] = 20,

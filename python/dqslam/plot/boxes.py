@@ -47,7 +47,10 @@ def draw_worst_and_median(results: Results, fits: BoxFits) -> "Figure":
         for axes, place, name in zip(grid, chosen, names, strict=False):
             pose = int(poses[place])
             axes.set_title(
-                f"{name}: pose {pose}, mean IoU {overlaps[place]:.2f}", loc="left", pad=2.0
+                f"{name}: pose {pose}, mean IoU {overlaps[place]:.2f}",
+                loc="left",
+                x=_AROUND / (1.0 + 2.0 * _AROUND),  # where the image begins
+                pad=2.0,
             )
             _frame(axes, camera.width, camera.height)
             _draw(axes, results, fits, pose, colors)

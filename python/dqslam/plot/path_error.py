@@ -8,7 +8,14 @@ from dqslam._checks import Floats
 from dqslam.plot.above import from_above
 from dqslam.plot.gaps import break_at_gaps
 from dqslam.plot.results_map import IN_TRUTH, WIDTH_INCHES, MapTruth, window
-from dqslam.plot.style import COLUMN_INCHES, TRUTH, column_style, new_figure, say_frame
+from dqslam.plot.style import (
+    COLUMN_INCHES,
+    TRUTH,
+    column_style,
+    legend_above,
+    new_figure,
+    say_frame,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -62,5 +69,5 @@ def draw_path_error(truth: MapTruth, positions: Floats, distance: Floats) -> "Fi
             aspect=40,
             pad=0.02,
         )
-        axes.legend(loc="best", frameon=False)
+        legend_above(figure, axes.get_lines())
     return figure

@@ -24,7 +24,7 @@ from dqslam.plot.style import (
     say_frame,
     shown_name,
 )
-from dqslam.plot.tracks import TRACK, draw_tracks
+from dqslam.plot.tracks import TRACK, TRACK_TAB, draw_tracks, track_ends
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -103,9 +103,9 @@ def draw_results_map(results: Results, truth: MapTruth | None = None) -> "Figure
         _draw_legend(figure, entries)
         place_labels(
             axes,
-            outlines,
-            _names(results.objects),
-            colors,
+            [*outlines, *track_ends(view, results.tracks, move)],
+            [*_names(results.objects), *(f"T{track.track_id}" for track in results.tracks)],
+            [*colors, *[TRACK_TAB] * len(results.tracks)],
             size=6.0 if len(outlines) <= _NAMED_BY_CLASS else 5.0,
         )
     return figure

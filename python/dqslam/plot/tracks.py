@@ -16,28 +16,41 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 TRACK: dict[str, Any] = {"color": "0.1", "linewidth": 0.9, "linestyle": (0, (4, 1.5))}
-_ARROWS = 4  # arrows along a track
+TRACK_TAB = "#1a1a1a"  # of the name at its end
+_MOST_ARROWS = 4  # along a track
+_ARROW_EVERY = 0.1  # of the side of the window
 # Edges of a cuboid join corners whose numbers differ in one binary digit.
 _EDGES = [(a, a | bit) for a in range(8) for bit in (1, 2, 4) if not a & bit]
 
 
 def draw_tracks(axes: "Axes", view: FromAbove, tracks: Sequence[Track], move: Alignment) -> None:
-    """Draw the path of each track from above, arrows along it, and its number at the end."""
+    """Draw the path of each track from above, and arrows along it; limits of axes must be set."""
+    side = max(float(abs(np.diff(axes.get_xlim())[0])), float(abs(np.diff(axes.get_ylim())[0])))
     for track in tracks:
         path = view.points(move.apply(track.centers))
         axes.plot(*path.T, gid="track", zorder=2.8, **TRACK)
-        for row in np.linspace(0, len(path) - 1, _ARROWS + 1).round().astype(int)[1:]:
+        length = float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
+        arrows = int(np.clip(length / (_ARROW_EVERY * side), 1, _MOST_ARROWS))
+        for row in np.linspace(0, len(path) - 1, arrows + 1).round().astype(int)[1:]:
             before = path[max(row - 1, 0)]
             if np.linalg.norm(path[row] - before) > 0.0:
                 axes.annotate(
                     "",
                     path[row],
                     before,
-                    arrowprops={"arrowstyle": "-|>", "color": "0.1", "lw": 0.6},
+                    arrowprops={
+                        "arrowstyle": "-|>",
+                        "color": "0.1",
+                        "lw": 0.6,
+                        "mutation_scale": 6,
+                    },
                     gid="track arrow",
                 )
-        name = f"T{track.track_id}"
-        axes.annotate(name, path[-1], (2, 2), textcoords="offset points", fontsize=5, clip_on=True)
+
+
+def track_ends(view: FromAbove, tracks: Sequence[Track], move: Alignment) -> list[Floats]:
+    """Return the last place of each track from above, (2, 1), where its name belongs."""
+    return [view.points(move.apply(track.centers[-1:])).T for track in tracks]
 
 
 def draw_track_cuboids(

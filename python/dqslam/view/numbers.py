@@ -26,7 +26,7 @@ def overview(results: Results, evaluation: Mapping[str, Any]) -> Numbers:
     ]
     if results.boxes is not None:
         held_out = int(results.boxes.held_out.sum())
-        apart = f", {held_out} of them held out" if held_out else ""
+        apart = f", {held_out} held out" if held_out else ""
         shown.append(("boxes", f"{len(results.boxes)}{apart}"))
     if not evaluation:
         return tuple(shown)
@@ -65,7 +65,10 @@ def object_numbers(results: Results, evaluation: Mapping[str, Any]) -> list[Numb
             shown.append(("σ of size", " × ".join(f"{100.0 * s:.2g} %" for s in sigmas)))
         if boxes is not None and overlap is not None:
             mine = boxes.object_id == objects.object_ids[row]
-            shown.append(("boxes", f"{mine.sum()}, {(mine & boxes.inlier).sum()} fit"))
+            held_out, used = mine & boxes.held_out, mine & ~boxes.held_out
+            apart = f", {held_out.sum()} held out" if held_out.any() else ""
+            shown.append(("boxes", f"{mine.sum()}{apart}"))
+            shown.append(("fit", f"{(used & boxes.inlier).sum()} of {used.sum()} used"))
             known = overlap[mine & np.isfinite(overlap)]
             if len(known):
                 shown.append(("IoU of boxes", f"{np.median(known):.3f}"))

@@ -47,6 +47,7 @@ class ImageView {
       this.drawOutline(context, outline, colorOf(row), seen.has(row), row === selected);
     }
     for (const row of rows) this.drawBox(context, row, selected);
+    this.drawNames(context, rows, selected);
     const heldOut = rows.filter((row) => boxes.state[row] === "held out").length;
     return { boxes: rows.length, heldOut, outlines: this.outlines.length, photograph: Boolean(photograph) };
   }
@@ -90,13 +91,25 @@ class ImageView {
     context.strokeStyle = object >= 0 ? this.colorOf(object) : "#999";
     context.strokeRect(left, top, right - left, bottom - top);
     context.setLineDash([]);
+  }
+
+  /** Write the name of each box above it: the selected one first, then those of the map; none over another. */
+  drawNames(context, rows, selected) {
+    const { boxes, objects } = this.scene, pixel = 1 / this.scale, taken = [];
     context.font = `${10 * pixel}px system-ui, sans-serif`;
     context.lineWidth = 3 * pixel;
     context.strokeStyle = "#ffffffd0";
-    context.fillStyle = object >= 0 ? "#222" : "#888";
-    const height = Math.max(top - 3 * pixel, 10 * pixel);
-    context.strokeText(boxes.className[row], left, height);
-    context.fillText(boxes.className[row], left, height);
+    const rank = (row) => (boxes.object[row] < 0 ? 2 : boxes.object[row] === selected ? 0 : 1);
+    for (const row of [...rows].sort((a, b) => rank(a) - rank(b))) {
+      const object = objects[boxes.object[row]], [left, top] = boxes.box[row];
+      const name = object ? `${boxes.className[row]} ${object.id}` : boxes.className[row];
+      const height = Math.max(top - 3 * pixel, 10 * pixel);
+      const right = left + context.measureText(name).width;
+      if (!takePlace(taken, [left, height - 9 * pixel, right, height + 2 * pixel])) continue;
+      context.fillStyle = object ? "#222" : "#888";
+      context.strokeText(name, left, height);
+      context.fillText(name, left, height);
+    }
   }
 
   /** The nearest object at a place of the canvas, CSS pixels; -1 for none. */

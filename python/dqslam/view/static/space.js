@@ -17,6 +17,7 @@ class SpaceView {
     Object.assign(this, { canvas, scene, shapes, trueShapes, boxesOf });
     this.drawn = [];
     this.surfaces = scene.objects.map((object) => object.surface && new Surface(object));
+    this.reaches = scene.objects.map(({ semiAxes }) => semiAxes && Math.max(...semiAxes));
     const path = scene.estimate.map((pose) => pose.slice(0, 3));
     this.everything = [...path, ...this.near(path)];
     this.orbit = new Orbit(canvas, scene.up, this.everything, onChange);
@@ -91,7 +92,8 @@ class SpaceView {
     this.eye = this.orbit.look();
     this.counts = { ellipsoids: 0, triangles: 0, labels: 0, covariances: 0, cameras: 0, trueObjects: 0, odometry: 0, truth: 0, estimate: 0 };
     this.drawn = [];
-    this.drawGrid();
+    this.specks = new Specks();
+    this.step = drawGrid(this);
     const items = [];
     for (const name of ["odometry", "truth", "estimate"]) {
       if (!shown[name]) continue;
@@ -107,6 +109,9 @@ class SpaceView {
     // Light and rings only where there is room to see them, and for the largest on the canvas.
     const sizes = this.drawn.map(({ outline }) => outline.long).sort((a, b) => b - a);
     this.detailed = Math.max(8, sizes[MOST_DETAILED] || 0);
+    this.specks.draw(this.context);
+    this.counts.specks = this.specks.count;
+    this.counts.ellipsoids += this.specks.count;
     items.sort((a, b) => b.depth - a.depth).forEach((item) => item.draw());
     if (shown.names) this.counts.labels = drawNames(this.context, [...this.drawn, ...moving], selected);
     measure.draw(this);
@@ -140,20 +145,6 @@ class SpaceView {
 
   depthOf(point) {
     return geometry.inCamera(this.eye.view, point)[2];
-  }
-
-  drawGrid() {
-    const { orbit } = this;
-    const [east, north] = orbit.level(orbit.target);
-    const rough = orbit.distance / 10, power = 10 ** Math.floor(Math.log10(rough));
-    this.step = power * [1, 2, 5, 10].find((factor) => factor * power >= rough);
-    const count = 10, half = count * this.step;
-    const e = Math.round(east / this.step) * this.step, n = Math.round(north / this.step) * this.step;
-    for (let k = -count; k <= count; k += 1) {
-      const style = { strokeStyle: theme.colors.grid, lineWidth: 1 };
-      this.stroke([[e + k * this.step, n - half, this.ground], [e + k * this.step, n + half, this.ground]].map(orbit.world), style);
-      this.stroke([[e - half, n + k * this.step, this.ground], [e + half, n + k * this.step, this.ground]].map(orbit.world), style);
-    }
   }
 
   /** A path; what is to come is faint. */
@@ -212,8 +203,14 @@ class SpaceView {
     const object = this.scene.objects[row];
     if (this.hidden.has(object.className)) return;
     const isSelected = selected.mapped === row, color = this.colorOf(row);
+    const speck = isSelected || !this.reaches[row] ? null : Specks.outlineOf(this.eye, object.center, this.reaches[row]);
+    if (shown.objects && speck) {
+      if (!this.isSeen(speck)) return;
+      this.drawn.push({ mapped: row, object, outline: speck });
+      this.specks.add(speck, color);
+    }
     const style = { strokeStyle: isSelected ? theme.colors["chosen-line"] : color, lineWidth: isSelected ? 2.6 : 1.2 };
-    if (shown.objects) {
+    if (shown.objects && !speck) {
       this.addOutline(items, object, this.shapes[row], { mapped: row }, (outline) => {
         const isDetailed = outline.long >= this.detailed;
         if (shown.surfaces && this.surfaces[row] && outline.long >= LEAST_SURFACE) {
@@ -241,12 +238,17 @@ class SpaceView {
     } });
   }
 
+  /** Whether a part of an outline is on the canvas. */
+  isSeen({ u, v, halfWidth, halfHeight }) {
+    const { cx, cy } = this.eye.lens;
+    return Math.abs(u - cx) <= cx + halfWidth && Math.abs(v - cy) <= cy + halfHeight;
+  }
+
   /** Add an object as an outline or, where it is no ellipsoid, as a cross. */
   addOutline(items, object, shape, name, paint, style) {
     const { view, lens, near } = this.eye;
     const outline = shape && geometry.outlineOfObject(view, lens, object, shape);
-    if (outline && (Math.abs(outline.u - lens.cx) > lens.cx + outline.halfWidth
-      || Math.abs(outline.v - lens.cy) > lens.cy + outline.halfHeight)) return;
+    if (outline && !this.isSeen(outline)) return;
     if (outline) {
       this.drawn.push({ ...name, object, outline });
       items.push({ depth: outline.depth, draw: () => paint(outline) });
@@ -323,6 +325,12 @@ class SpaceView {
       }
       flush();
     }
+  }
+
+  /** Where the mapped objects are on the canvas, as {id, u, v}. */
+  places() {
+    return this.drawn.filter((one) => one.mapped !== undefined)
+      .map(({ object, outline }) => ({ id: object.id, u: outline.u, v: outline.v }));
   }
 
   /** The nearest object at a place of the canvas, CSS pixels, a mapped one if any; empty for none. */

@@ -62,8 +62,6 @@
       waiting = false;
       const { frame } = player, style = { colorOf, hidden: list.hidden, measure, onLoad: redraw };
       const counts = { ...space.draw(shown, frame, selected, style), image: image.draw(frame, selected.mapped, style) };
-      const places = space.drawn.filter((one) => one.mapped !== undefined)
-        .map(({ object, outline }) => ({ id: object.id, u: outline.u, v: outline.v }));
       const time = scene.timestamps[frame], since = Number((time - scene.timestamps[0]).toFixed(3));
       const { boxes, heldOut, outlines } = counts.image;
       element("status").value = `image ${frame + 1} of ${scene.timestamps.length}, ${since} s: `
@@ -71,7 +69,10 @@
       element("status").title = `at ${Number(time.toFixed(6))} s`;
       element("hint").textContent = measure.text || `Grid ${Number(space.step.toPrecision(3))} m. Drag to turn, `
         + "shift and drag to move, wheel to zoom, click an object, click twice to fly there.";
-      window.onScreen = { ...counts, places }; // for tests and scripts
+      window.onScreen = { // for tests and scripts
+        ...counts,
+        get places() { return space.places(); },
+      };
     });
   }
 
