@@ -52,10 +52,19 @@ def _show(found: list[merging.Trial]) -> None:
         "turn of the alignment, error [deg]": [abs(one.turn_deg) for one in aligned],
         "common objects, error of the alignment [m]": [one.shift_m for one in aligned],
         "NEES of merged centers / 3": [one.nees for one in aligned],
-        "merged centers, error [m]": [one.merged_m for one in aligned],
-        "first map alone [m]": [one.single_m[0] for one in aligned],
-        "second map alone [m]": [one.single_m[1] for one in aligned],
-        "the better one of both [m]": [min(one.single_m) for one in aligned],
+        "in the first frame: first map alone [m]": [one.single_m[0] for one in aligned],
+        "its objects in the merged map [m]": [one.merged_at[0] for one in aligned],
+        "all objects of the merged map [m]": [one.merged_m for one in aligned],
+        "in the second frame: second map alone [m]": [one.single_m[1] for one in aligned],
+        "its objects in the merged map, in that frame [m]": [one.merged_at[1] for one in aligned],
+        "rigidly aligned: first map alone [m]": [one.aligned_m[0] for one in aligned],
+        "its objects in the merged map, aligned [m]": [one.merged_aligned[0] for one in aligned],
+        "second map alone, aligned [m]": [one.aligned_m[1] for one in aligned],
+        "its objects in the merged map, aligned again [m]": [
+            one.merged_aligned[1] for one in aligned
+        ],
+        "the better one of both alone, aligned [m]": [min(one.aligned_m) for one in aligned],
+        "all objects of the merged map, aligned [m]": [one.merged_all_aligned for one in aligned],
         "NEES of the first map alone / 3": [one.single_nees[0] for one in aligned],
         "NEES of the second map alone / 3": [one.single_nees[1] for one in aligned],
     }
