@@ -16,7 +16,7 @@ from dqslam.io import Results
 from dqslam.io.results import load_map_results
 from dqslam.lens import camera_with, lens_of
 from dqslam.places.landmarks import read_landmarks
-from dqslam.places.locate_boxes import LabeledBoxes, check_labels, label_boxes
+from dqslam.places.locate_boxes import LabeledBoxes, check_labels, label_boxes, labels_of_array
 from dqslam.places.locate_map import ImageBoxes, PlaceMap
 from dqslam.places.locate_score import SE3, Frame
 from dqslam.places.locate_search import Places, find_places
@@ -97,7 +97,7 @@ def locate(
     boxes: Detections,
     camera: _core.Camera,
     *,
-    labels: Sequence[Mapping[str, float]] | None = None,
+    labels: Sequence[Mapping[str, float]] | Floats | None = None,
     odometry: ArrayLike | None = None,
     odometry_noise: OdometryNoise | None = None,
     min_confidence: float = 0.9,
@@ -115,7 +115,9 @@ def locate(
     camera
         The camera of the image, which may differ from the map's. Its mount is ignored.
     labels
-        Names of classes that each box may be of, with weights, shape (m,), instead of its class.
+        What each box may be instead of its class: names of classes with weights, shape (m,), or an
+        array of probabilities, shape (m, c), whose columns are the classes of
+        ``boxes.class_names`` by their numbers.
     odometry
         Poses of the camera in a frame of its own, world_from_camera, shape (n, 7), if the boxes are
         of several images: ``boxes.pose`` are rows of it.
@@ -147,6 +149,7 @@ def locate(
     if not 0.0 < min_confidence < 1.0:
         raise ValueError(f"min_confidence is {min_confidence:g}, not between 0 and 1")
     if labels is not None:
+        labels = labels_of_array(labels, boxes)
         check_labels(labels, len(boxes))
     place = known if isinstance(known, PlaceMap) else place_of(known)
     lens = lens_of(camera)

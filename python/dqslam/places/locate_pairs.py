@@ -7,6 +7,7 @@ two objects from each other, which the map knows: most wrong pairs contradict it
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
+from itertools import combinations
 from typing import Self
 
 import numpy as np
@@ -28,6 +29,8 @@ _DISTANCE_SIGMA, _CUT_SIGMA = 0.05, 0.15
 _CUT_SIZE_SIGMA = 0.4
 # Pairs that follow one another, at most, among which triples are looked for.
 _MOST_CHAINS = 1_000_000
+# A triple of boxes is this much less preferred for each time that each of its boxes was taken.
+_USED_AGAIN = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,12 +202,33 @@ def closed(pairings: Pairings, pairs: Ints, triples: Ints, most: int) -> tuple[I
     return triples[best], np.column_stack([strong // count, strong % count])
 
 
-def supported(pairings: Pairings, pairs: Ints, groups: Ints, most: int) -> Ints:
-    """Keep the groups (t, k) whose pairings agree with most other boxes, if there are very many."""
-    if len(groups) <= most:
-        return groups
-    agrees = np.zeros((len(pairings), int(pairings.box.max()) + 1), dtype=np.bool_)
-    for one, other in ((0, 1), (1, 0)):
-        agrees[pairs[:, one], pairings.box[pairs[:, other]]] = True
-    support = agrees.sum(axis=1)[groups].sum(axis=1)
-    return groups[np.argsort(-support, kind="stable")[:most]]
+def triples_by_boxes(pairings: Pairings, pairs: Ints, most: int) -> Ints:
+    """Return triangles of pairs, (t, 3), of some triples of boxes; about ``most`` of all.
+
+    Among many objects of a class, most triples agree by chance, and nothing tells the right ones
+    from these before poses are compared with the other boxes. All triples of a few boxes contain
+    the right one, if these boxes show objects of the map: several triples of boxes are taken, those
+    of few objects first, and others than before.
+    """
+    count = len(pairings)
+    boxes = np.unique(pairings.box[pairs])
+    box = np.searchsorted(boxes, pairings.box[pairs])
+    number = np.zeros((len(boxes), len(boxes)))
+    np.add.at(number, (box[:, 0], box[:, 1]), 1.0)
+    objects = np.bincount(np.searchsorted(boxes, pairings.box[np.isin(pairings.box, boxes)]))
+    left = np.array(list(combinations(range(len(boxes)), 3)), dtype=np.int64).reshape(-1, 3)
+    sides = [number[left[:, i], left[:, j]] for i, j in ((0, 1), (1, 2), (0, 2))]
+    expected = np.prod(sides, axis=0) / np.maximum(objects[left].prod(axis=1), 1)
+    used = np.zeros(len(boxes))
+    found, total = [np.zeros((0, 3), dtype=np.int64)], 0
+    left, expected = left[expected > 0.0], expected[expected > 0.0]
+    while len(left) and total < most:
+        best = int(np.argmin(expected * _USED_AGAIN ** used[left].sum(axis=1)))
+        own = np.isin(box, left[best]).all(axis=1)
+        found.append(triangles(pairs[own], count))
+        if len(found[-1]) > most:  # evenly spaced ones: they are in the order of the objects
+            found[-1] = found[-1][:: -(-len(found[-1]) // most)]
+        total += len(found[-1])
+        used[left[best]] += 1.0
+        left, expected = np.delete(left, best, axis=0), np.delete(expected, best)
+    return np.concatenate(found)
