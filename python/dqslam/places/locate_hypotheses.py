@@ -31,7 +31,7 @@ _ROUNDS, _MOST_CHI2 = 4, 16.0
 # After one round, a larger one does not fall that far.
 _HOPELESS_CHI2 = 50.0
 # Triples that poses are found of, at most, in a small and in a large map.
-_MOST_TRIPLES, _MOST_TRIPLES_LARGE = 12_000, 3_000
+_MOST_TRIPLES, _MOST_TRIPLES_LARGE = 16_000, 3_000
 # Poses of triples, and pairs that stand, at most: the best of more are taken.
 _MOST_POSES = 4_000
 # The least sine of the angle of a triple of objects: three in a line determine no pose.
@@ -89,10 +89,14 @@ def _resect(pairings: Pairings, triples: Ints, upright: Upright | None) -> Hypot
     lengths = np.linalg.norm(one, axis=1) * np.linalg.norm(two, axis=1)
     bent = np.linalg.norm(np.cross(one, two), axis=1) > _LEAST_SINE * lengths
     triples, world, ray = triples[bent], world[bent], ray[bent]
-    _, chi2 = _solve_distances(pairings, triples, rounds=1)
-    hopeful = chi2 < _HOPELESS_CHI2
+    log_distance, chi2 = _solve_distances(pairings, triples, rounds=1)
+    hopeful = np.flatnonzero(chi2 < _HOPELESS_CHI2)
+    if len(hopeful) > 2 * _MOST_POSES:
+        hopeful = hopeful[np.argsort(chi2[hopeful], kind="stable")[: 2 * _MOST_POSES]]
     triples, world, ray = triples[hopeful], world[hopeful], ray[hopeful]
-    log_distance, chi2 = _solve_distances(pairings, triples)
+    log_distance, chi2 = _solve_distances(
+        pairings, triples, rounds=_ROUNDS - 1, begin=log_distance[hopeful]
+    )
     fits = np.flatnonzero(chi2 < _MOST_CHI2)
     camera = ray[fits] * np.exp(log_distance[fits])[:, :, None]
     world = world[fits]
@@ -138,12 +142,13 @@ def _stand(pairings: Pairings, pairs: Ints, upright: Upright) -> Hypotheses:
 
 
 def _solve_distances(
-    pairings: Pairings, groups: Ints, *, rounds: int = _ROUNDS
+    pairings: Pairings, groups: Ints, *, rounds: int = _ROUNDS, begin: Floats | None = None
 ) -> tuple[Floats, Floats]:
     """Find the distances whose differences are the map's, near those of the apparent sizes.
 
-    The groups (t, k) are pairs or triples. Return the logarithms of the distances (t, k) and the
-    chi-square of each group (t,).
+    The groups (t, k) are pairs or triples. Newton's method begins at those of the apparent sizes or
+    at ``begin`` (t, k), logarithms. Return the logarithms of the distances (t, k) and the chi-square
+    of each group (t,).
     """
     start, sigma = pairings.log_distance[groups], pairings.sigma[groups]
     ray, world, blur = pairings.ray[groups], pairings.center[groups], pairings.ray_sigma[groups]
@@ -151,7 +156,7 @@ def _solve_distances(
     cosine = (ray[:, first] * ray[:, second]).sum(axis=2)
     known = np.linalg.norm(world[:, first] - world[:, second], axis=2)
     relative = 0.5 * np.maximum(blur[:, first], blur[:, second])
-    log_distance = start.copy()
+    log_distance = start if begin is None else begin
     for last in [False] * rounds + [True]:
         distance = np.exp(log_distance)
         a, b = distance[:, first], distance[:, second]
