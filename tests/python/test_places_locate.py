@@ -116,8 +116,8 @@ def test_a_symmetric_place_is_ambiguous(tmp_path):
     found = dq.locate(place, detections_of(box, names), LENS)
     assert found.reason.startswith("ambiguous: ")
     probabilities = [one.probability for one in found.candidates[:4]]
-    assert max(probabilities) < 0.5
-    assert sum(probabilities) == pytest.approx(1.0, abs=0.05)
+    assert max(probabilities) < 0.25
+    assert probabilities == pytest.approx([probabilities[0]] * 4, rel=0.05)
     quarter = Rotation.from_euler("z", 90, degrees=True)
     for one in found.candidates[:4]:
         copies = [(quarter**k).apply(pose[:3]) for k in range(4)]

@@ -22,6 +22,8 @@ class LabeledBoxes:
     """Row of each box among all detections, shape (b,); that of the best label of several."""
     box: Floats
     """Undistorted pixels, shape (b, 4)."""
+    score: Floats
+    """Confidence of the detector, shape (b,)."""
     truncated: Bools
     """Shape (b, 4)."""
     labels: list[Mapping[str, float]]
@@ -55,6 +57,7 @@ def label_boxes(
     return LabeledBoxes(
         row=chosen,
         box=detections.box[chosen],
+        score=detections.score[chosen],
         truncated=detections.truncated[chosen],
         labels=[found[place] for place in order.tolist()],
     )

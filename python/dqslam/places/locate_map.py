@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Self
@@ -16,6 +15,7 @@ from dqslam.io.results import ellipsoid_covariances
 from dqslam.io.results.map_covariances import UNKNOWN_LOG_SIGMA
 from dqslam.lens import cut_edges
 from dqslam.places.landmarks import Landmarks
+from dqslam.places.locate_boxes import LabeledBoxes
 from dqslam.places.locate_upright import Upright, find_up
 from dqslam.places.sensor import Sensor, assumed_sensor, learn_sensor
 
@@ -217,11 +217,10 @@ class ImageBoxes:
         cls,
         place: PlaceMap,
         camera: _core.Camera,
-        box: Floats,
-        truncated: Bools,
-        labels: Sequence[Mapping[str, float]],
+        labeled: LabeledBoxes,
     ) -> Self:
-        """Compare boxes (b, 4) and the weights of their labels with a map."""
+        """Compare boxes and the weights of their labels with a map."""
+        box, labels = labeled.box, labeled.labels
         sensor, count = place.sensor, len(place.sensor.labels)
         column = {name: row for row, name in enumerate(sensor.labels)}
         weight = np.zeros((len(box), count + 1))
@@ -232,12 +231,12 @@ class ImageBoxes:
         # A label that no object ever had is as likely as the least of the others.
         unknown = sensor.log_label.min(axis=1, keepdims=True)
         table = np.exp(np.hstack([sensor.log_label, unknown]))
-        cut = truncated | cut_edges(camera, box)
+        cut = labeled.truncated | cut_edges(camera, box)
         false = np.log(weight @ np.exp(sensor.log_false_label) * sensor.false_boxes)
         other = np.log(weight @ np.exp(sensor.log_any_label) * sensor.all_boxes)
         return cls(
             box=box,
-            covariance=sensor.box_covariance(box, camera),
+            covariance=sensor.box_covariance(box, labeled.score, camera),
             truncated=cut,
             log_label=np.log(weight @ table.T),
             log_false=false + _log_density(camera, box, cut),
