@@ -65,7 +65,9 @@ def _groups(random: np.random.Generator) -> World:
     usual = np.exp(random.normal(np.log(0.25), 0.3, (4, 3)))
     chairs = int(random.integers(2, 6))
     angle = 2.0 * np.pi * np.arange(chairs) / chairs
-    group = np.vstack([[0.0, 0.0, 0.7], np.column_stack([np.cos(angle), np.sin(angle), 0 * angle + 0.5])])
+    group = np.vstack(
+        [[0.0, 0.0, 0.7], np.column_stack([np.cos(angle), np.sin(angle), 0 * angle + 0.5])]
+    )
     kinds = np.array([0] + [1] * chairs)
 
     def lay() -> Room:
