@@ -272,6 +272,11 @@ def _reason(
     named = sum(any(name in known for name in names) for one in labeled for names in one.labels)
     total = sum(len(one.row) for one in labeled)
     counted = f"{named} of {total} boxes are of classes in the map"
+    if not candidates and places.is_given_up:
+        return (
+            f"ambiguous: {counted}, but these classes have too many objects among the "
+            f"{len(place.object_ids)} of the map for sizes and distances to tell them apart"
+        )
     if not candidates:
         return f"too few: {counted}, and no three agree about a pose"
     best = candidates[0]

@@ -46,6 +46,8 @@ class Hypotheses:
     """Shape (h, 3, 3)."""
     position: Floats
     """Shape (h, 3)."""
+    is_given_up: bool = False
+    """Whether there are too many objects alike to look for poses."""
 
 
 def find_hypotheses(
@@ -58,7 +60,9 @@ def find_hypotheses(
     agree = AGREE_LARGE if is_large else AGREE
     boxes, counts = np.unique(pairings.box, return_counts=True)
     chosen = boxes[np.lexsort((counts, ~whole[boxes]))[:_MOST_BOXES]]
-    chosen, reach = within_budget(pairings, chosen, agree)
+    affordable, reach = within_budget(pairings, chosen, agree)
+    is_given_up = len(affordable) < len(chosen) and not len(affordable)
+    chosen = affordable
     pairs = agreeing_pairs(pairings, chosen, reach, agree)
     if is_large:
         most = _MOST_TRIPLES_LARGE
@@ -74,6 +78,7 @@ def find_hypotheses(
     return Hypotheses(
         np.concatenate([one.rotation for one in found]),
         np.concatenate([one.position for one in found]),
+        is_given_up,
     )
 
 

@@ -20,6 +20,9 @@ from dqslam.places.locate_map import ImageBoxes, PlaceMap
 _LEAST_LABEL = 0.1
 # Pairs of objects that boxes are compared with, about, and the boxes that are left in any case.
 _MOST_COMPARED, _FEWEST_BOXES = 100_000, 3
+# If even these boxes would be compared with more pairs, so many agree by chance that sizes and
+# distances do not tell the objects apart.
+_HOPELESS = 2_000_000
 # Sigmas within which distances agree in a small and in a large map, where many do by chance.
 AGREE, AGREE_LARGE = 3.0, 2.0
 # Relative error of a distance between objects, from their centers in the image and in the map, and
@@ -111,8 +114,8 @@ def within_budget(pairings: Pairings, boxes: Ints, agree: float) -> tuple[Ints, 
     """Return as many of the boxes (b,) as the search has time for, and their reaches (b, b).
 
     Among thousands of objects of one class, boxes of objects that are near each other are compared
-    with few pairs of objects. At least three boxes are returned. ``agree`` are the sigmas within
-    which distances agree.
+    with few pairs of objects. At least three boxes are returned; or none, if these are too many
+    even for them. ``agree`` are the sigmas within which distances agree.
     """
     if not len(boxes):
         return boxes, np.zeros((0, 0))
@@ -125,6 +128,8 @@ def within_budget(pairings: Pairings, boxes: Ints, agree: float) -> tuple[Ints, 
     kept = list(range(len(boxes)))
     while len(kept) > _FEWEST_BOXES and cost[np.ix_(kept, kept)].sum() > 2.0 * _MOST_COMPARED:
         kept.pop(int(cost[np.ix_(kept, kept)].sum(axis=1).argmax()))
+    if cost[np.ix_(kept, kept)].sum() > 2.0 * _HOPELESS:
+        kept = []
     return boxes[kept], reach[np.ix_(kept, kept)]
 
 
