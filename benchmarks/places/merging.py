@@ -102,15 +102,15 @@ def _merge(seed: int, a: Robot, b: Robot, directory: Path, *, solves: bool) -> T
         for own, here in zip(merged.parts[1].object_ids, merged.parts[1].merged_ids, strict=True)
         if here in ids_of_a
     ]
-    centers, true_ids = merged.landmarks.centers, np.array(true_ids)
+    centers, true_rows = merged.landmarks.centers, np.array(true_ids)
     at, aligned = [], []
     for part, robot in zip(merged.parts, (a, b), strict=True):
         back = np.linalg.inv(part.merged_from_map)
         own = np.isin(merged.landmarks.object_ids, part.merged_ids)
         there = centers[own] @ back[:3, :3].T + back[:3, 3]
-        truth = robot.truth.center[true_ids[own]]
-        at.append(float(np.linalg.norm(there - truth, axis=1).mean()))
-        aligned.append(_apart(there, truth))
+        own_truth = robot.truth.center[true_rows[own]]
+        at.append(float(np.linalg.norm(there - own_truth, axis=1).mean()))
+        aligned.append(_apart(there, own_truth))
     right = sum(own == other for own, other in pairs)
     common = np.intersect1d(merged.parts[0].object_ids, merged.parts[1].object_ids)
     return replace(
@@ -123,7 +123,7 @@ def _merge(seed: int, a: Robot, b: Robot, directory: Path, *, solves: bool) -> T
         merged_m=float(np.linalg.norm(errors, axis=1).mean()),
         merged_at=(at[0], at[1]),
         merged_aligned=(aligned[0], aligned[1]),
-        merged_all_aligned=_apart(centers, a.truth.center[true_ids]),
+        merged_all_aligned=_apart(centers, a.truth.center[true_rows]),
     )
 
 

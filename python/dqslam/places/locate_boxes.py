@@ -77,8 +77,8 @@ def labels_of_array(
         return labels
     names = [detections.class_names[number] for number in sorted(detections.class_names)]
     table = as_floats("labels", labels, [len(detections), len(names)])
-    reject_rows("labels", (table < 0.0).any(axis=1), "negative", table)
-    reject_rows("labels", ~(table.sum(axis=1) > 0.0), "no class is possible", table)
+    reject_rows("labels", table < 0.0, "negative", table)
+    reject_rows("labels", table.max(axis=1, initial=0.0) <= 0.0, "no class is possible", table)
     return [
         {names[column]: float(row[column]) for column in np.flatnonzero(row).tolist()}
         for row in table

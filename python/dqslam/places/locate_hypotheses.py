@@ -152,8 +152,8 @@ def _solve_distances(
     """Find the distances whose differences are the map's, near those of the apparent sizes.
 
     The groups (t, k) are pairs or triples. Newton's method begins at those of the apparent sizes or
-    at ``begin`` (t, k), logarithms. Return the logarithms of the distances (t, k) and the chi-square
-    of each group (t,).
+    at ``begin`` (t, k), logarithms. Return the logarithms of the distances (t, k) and the
+    chi-square of each group (t,).
     """
     start, sigma = pairings.log_distance[groups], pairings.sigma[groups]
     ray, world, blur = pairings.ray[groups], pairings.center[groups], pairings.ray_sigma[groups]
