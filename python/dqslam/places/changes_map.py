@@ -123,7 +123,8 @@ class SeenMap:
         direction = apart / np.maximum(distance, 1e-12)[:, :, None]
         inverse = np.linalg.inv(_core.ellipsoid_shapes(self.ellipsoids))
         # How far each object reaches towards each other one.
-        reach = np.einsum("abi,aij,abj->ab", direction, inverse, direction) ** -0.5
+        square = np.einsum("abi,aij,abj->ab", direction, inverse, direction)
+        reach = np.maximum(square, 1e-12) ** -0.5
         names = np.array(self.class_names)
         near = distance < WITHIN * (reach + reach.T)
         return np.asarray(near & (names[:, None] == names) & ~np.eye(len(names), dtype=np.bool_))
