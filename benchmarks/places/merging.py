@@ -33,6 +33,14 @@ class Trial:
     """Mean error of each map alone, in its own frame."""
     single_nees: tuple[float, float]
     """NEES of the centers of each map alone, divided by 3."""
+    merged_at: tuple[float, float] = (np.nan, np.nan)
+    """Mean error of the merged map in the frame of each robot, at the objects of its own map."""
+    aligned_m: tuple[float, float] = (np.nan, np.nan)
+    """As ``single_m``, after the rigid motion that brings the centers nearest to the true ones."""
+    merged_aligned: tuple[float, float] = (np.nan, np.nan)
+    """Mean error of the merged map after such a motion, at the objects of each robot's own map."""
+    merged_all_aligned: float = np.nan
+    """Likewise at all objects."""
     twice: int = 0
     """Objects that both have and that the merged map has twice."""
     wrong: int = 0
@@ -59,8 +67,19 @@ def _merge(seed: int, a: Robot, b: Robot, directory: Path, *, solves: bool) -> T
         _nees(one.centers - robot.truth.center[one.object_ids], one.covariances)
         for one, robot in zip(maps, (a, b), strict=True)
     )
+    alone = [
+        _apart(one.estimate.centers, one.truth.center[one.estimate.object_ids]) for one in (a, b)
+    ]
     nothing = Trial(
-        seed, "", np.nan, np.nan, np.nan, np.nan, (single[0], single[1]), (honest[0], honest[1])
+        seed,
+        "",
+        np.nan,
+        np.nan,
+        np.nan,
+        np.nan,
+        (single[0], single[1]),
+        (honest[0], honest[1]),
+        aligned_m=(alone[0], alone[1]),
     )
     try:
         merged = merge(*maps)
@@ -83,6 +102,15 @@ def _merge(seed: int, a: Robot, b: Robot, directory: Path, *, solves: bool) -> T
         for own, here in zip(merged.parts[1].object_ids, merged.parts[1].merged_ids, strict=True)
         if here in ids_of_a
     ]
+    centers, true_rows = merged.landmarks.centers, np.array(true_ids)
+    at, aligned = [], []
+    for part, robot in zip(merged.parts, (a, b), strict=True):
+        back = np.linalg.inv(part.merged_from_map)
+        own = np.isin(merged.landmarks.object_ids, part.merged_ids)
+        there = centers[own] @ back[:3, :3].T + back[:3, 3]
+        own_truth = robot.truth.center[true_rows[own]]
+        at.append(float(np.linalg.norm(there - own_truth, axis=1).mean()))
+        aligned.append(_apart(there, own_truth))
     right = sum(own == other for own, other in pairs)
     common = np.intersect1d(merged.parts[0].object_ids, merged.parts[1].object_ids)
     return replace(
@@ -93,7 +121,16 @@ def _merge(seed: int, a: Robot, b: Robot, directory: Path, *, solves: bool) -> T
         shift_m=float(np.linalg.norm(apart[:, :2], axis=1).mean()),
         nees=_nees(errors, merged.landmarks.covariances),
         merged_m=float(np.linalg.norm(errors, axis=1).mean()),
+        merged_at=(at[0], at[1]),
+        merged_aligned=(aligned[0], aligned[1]),
+        merged_all_aligned=_apart(centers, a.truth.center[true_rows]),
     )
+
+
+def _apart(centers: Floats, truth: Floats) -> float:
+    """Return the mean error of centers (o, 3) after the best rigid motion."""
+    moved = dq.align_rigid(centers, truth).apply(centers)
+    return float(np.linalg.norm(moved - truth, axis=1).mean())
 
 
 def _errors(robot: Robot) -> Floats:

@@ -48,20 +48,46 @@ def _show(found: list[merging.Trial]) -> None:
         return
     twice, wrong = (sum(getattr(one, name) for one in aligned) for name in ("twice", "wrong"))
     say(f"objects of both that the merged map has twice: {twice}; two taken for one: {wrong}")
+    better = [int(np.argmin(one.aligned_m)) for one in aligned]  # known by the truth only
     rows = {
         "turn of the alignment, error [deg]": [abs(one.turn_deg) for one in aligned],
         "common objects, error of the alignment [m]": [one.shift_m for one in aligned],
-        "NEES of merged centers / 3": [one.nees for one in aligned],
-        "merged centers, error [m]": [one.merged_m for one in aligned],
-        "first map alone [m]": [one.single_m[0] for one in aligned],
+        "**in the frame of a robot**: first map alone [m]": [one.single_m[0] for one in aligned],
+        "its objects in the merged map [m]": [one.merged_at[0] for one in aligned],
         "second map alone [m]": [one.single_m[1] for one in aligned],
-        "the better one of both [m]": [min(one.single_m) for one in aligned],
-        "NEES of the first map alone / 3": [one.single_nees[0] for one in aligned],
-        "NEES of the second map alone / 3": [one.single_nees[1] for one in aligned],
+        "its objects in the merged map, as it lies to the second [m]": [
+            one.merged_at[1] for one in aligned
+        ],
+        "**after the best rigid motion**: first map alone [m]": [
+            one.aligned_m[0] for one in aligned
+        ],
+        "the objects of the first in the merged map [m]": [
+            one.merged_aligned[0] for one in aligned
+        ],
+        "the second map alone [m]": [one.aligned_m[1] for one in aligned],
+        "the objects of the second in the merged map [m]": [
+            one.merged_aligned[1] for one in aligned
+        ],
+        "the better one of both alone [m]": [
+            one.aligned_m[row] for one, row in zip(aligned, better, strict=True)
+        ],
+        "the objects of the better one in the merged map [m]": [
+            one.merged_aligned[row] for one, row in zip(aligned, better, strict=True)
+        ],
+        "all objects of the merged map [m]": [one.merged_all_aligned for one in aligned],
+        "**NEES / 3** of merged centers": [one.nees for one in aligned],
+        "of the first map alone": [one.single_nees[0] for one in aligned],
+        "of the second map alone": [one.single_nees[1] for one in aligned],
     }
     say("| | mean | median | largest |\n|---|---|---|---|")
     for name, values in rows.items():
         say(f"| {name} | {np.mean(values):.3f} | {np.median(values):.3f} | {max(values):.3f} |")
+    nearer = np.array([np.less(one.merged_aligned, one.aligned_m) for one in aligned])
+    best = nearer[np.arange(len(aligned)), better]
+    say(
+        f"after the best rigid motion, the merged map is nearer to the truth than {nearer.sum()} "
+        f"of {nearer.size} maps alone, and than {best.sum()} of {best.size} better ones of both"
+    )
 
 
 def _printer() -> partial[None]:

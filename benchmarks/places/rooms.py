@@ -3,7 +3,7 @@
 The model of the boxes is stated here, and nothing of it is told to the package: boxes of ellipsoids
 with an error of 1.5 px and of 4 % of the side on each edge, an object at a time; detection by
 apparent size; 5 % wrong labels; 0.7 boxes an image that show nothing; nothing behind a nearer
-object.
+object. ``benchmarks.places.worlds`` has other places and other detectors.
 """
 
 from __future__ import annotations
@@ -20,11 +20,29 @@ from dqslam.places.visibility import view_objects
 from dqslam.recording import Detections
 
 CAMERA = _core.Camera(520.0, 520.0, 319.5, 239.5, 640, 480)
-PIXELS, RELATIVE = 1.5, 0.04
-BEST_RATE, HALF_RATE_PX, RATE_WIDTH_PX = 0.85, 16.0, 4.0
-CONFUSION, FALSE_BOXES = 0.05, 0.7
-HIDDEN, LEAST_IN_IMAGE, FARTHEST_M = 0.6, 0.4, 8.0
+RATE_WIDTH_PX = 4.0
+HIDDEN, LEAST_IN_IMAGE = 0.6, 0.4
 CENTER_SIGMA_M, LOG_SIGMA = 0.02, 0.05
+
+
+@dataclass(frozen=True)
+class Detector:
+    """What boxes an image has."""
+
+    pixels: float = 1.5
+    relative: float = 0.04
+    """Of the side of a box."""
+    best_rate: float = 0.85
+    half_rate_px: float = 16.0
+    confusion: float = 0.05
+    false_boxes: float = 0.7
+    farthest_m: float = 8.0
+    cuboids: bool = False
+    """The boxes are those of cuboids of the semi-axes, and no ellipsoid fits them from all sides.
+    """
+
+
+USUAL = Detector()
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,26 +139,47 @@ class Seen:
     object_row: np.ndarray
 
 
-def draw_boxes(room: Room, poses: np.ndarray, random: np.random.Generator) -> Seen:
+def box_cuboids(poses: np.ndarray, room: Room) -> np.ndarray:
+    """Return the boxes (m, 4) of cuboids at poses (m, 7), by their corners before the camera.
+
+    The half-sides are 0.9 of the semi-axes.
+    """
+    from scipy.spatial.transform import Rotation
+
+    signs = np.array(np.meshgrid(*[[-0.9, 0.9]] * 3)).reshape(3, 8).T
+    turn = Rotation.from_quat(room.turns).as_matrix()
+    corners = room.centers[:, None] + (signs * room.semi_axes[:, None]) @ turn.transpose(0, 2, 1)
+    world = Rotation.from_quat(poses[:, 3:]).as_matrix()
+    inside = (corners - poses[:, None, :3]) @ world
+    depth = np.maximum(inside[..., 2:], 0.05)
+    at = inside[..., :2] / depth * [CAMERA.fx, CAMERA.fy] + [CAMERA.cx, CAMERA.cy]
+    return np.hstack([at.min(axis=1), at.max(axis=1)])
+
+
+def draw_boxes(
+    room: Room, poses: np.ndarray, random: np.random.Generator, detector: Detector = USUAL
+) -> Seen:
     """Draw the boxes of images at poses (n, 7)."""
     views = view_objects(CAMERA, poses, room.ellipsoids)
-    rate = BEST_RATE / (1.0 + np.exp(-(views.size - HALF_RATE_PX) / RATE_WIDTH_PX))
+    size = views.size - detector.half_rate_px
+    rate = detector.best_rate / (1.0 + np.exp(-size / RATE_WIDTH_PX))
     seen = (views.in_image > LEAST_IN_IMAGE) & (views.covered < HIDDEN)
-    seen &= (views.distance < FARTHEST_M) & (random.random(rate.shape) < rate)
+    seen &= (views.distance < detector.farthest_m) & (random.random(rate.shape) < rate)
     pose, row = np.nonzero(seen)
     box = views.box[pose, row]
+    if detector.cuboids:
+        box = box_cuboids(poses[pose], room.select(row))
     side = np.tile(box[:, 2:] - box[:, :2], (1, 2))
-    box = (
-        box + random.normal(0.0, PIXELS, box.shape) + random.normal(0.0, RELATIVE, box.shape) * side
-    )
-    false = random.poisson(FALSE_BOXES, len(poses))
+    box = box + random.normal(0.0, detector.pixels, box.shape)
+    box += random.normal(0.0, detector.relative, box.shape) * side
+    false = random.poisson(detector.false_boxes, len(poses))
     middle = random.uniform([0, 0], [CAMERA.width, CAMERA.height], (false.sum(), 2))
     half = np.exp(random.uniform(np.log(6.0), np.log(100.0), (false.sum(), 2)))
     box = np.vstack([box, np.hstack([middle - half, middle + half])])
     pose = np.concatenate([pose, np.repeat(np.arange(len(poses)), false)])
     row = np.concatenate([row, np.full(false.sum(), -1)])
     any_class = random.integers(0, len(room.class_names), len(row))
-    wrong = (row < 0) | (random.random(len(row)) < CONFUSION)
+    wrong = (row < 0) | (random.random(len(row)) < detector.confusion)
     class_id = np.where(wrong, any_class, np.append(room.class_id, 0)[row])
     last = np.array([CAMERA.width - 0.5, CAMERA.height - 0.5])
     box = np.hstack([np.clip(box[:, :2], -0.5, last), np.clip(box[:, 2:], -0.5, last)])
@@ -150,14 +189,24 @@ def draw_boxes(room: Room, poses: np.ndarray, random: np.random.Generator) -> Se
 
 
 def map_room(
-    room: Room, images: int, random: np.random.Generator, *, everything: bool = False
+    room: Room,
+    images: int,
+    random: np.random.Generator,
+    detector: Detector = USUAL,
+    *,
+    everything: bool = False,
 ) -> Results:
     """Make the map of a visit of so many images; see ``map_with_rows``."""
-    return map_with_rows(room, images, random, everything=everything)[0]
+    return map_with_rows(room, images, random, detector, everything=everything)[0]
 
 
 def map_with_rows(
-    room: Room, images: int, random: np.random.Generator, *, everything: bool = False
+    room: Room,
+    images: int,
+    random: np.random.Generator,
+    detector: Detector = USUAL,
+    *,
+    everything: bool = False,
 ) -> tuple[Results, np.ndarray]:
     """Make the map of a visit of so many images: objects with errors, all boxes with the object.
 
@@ -165,7 +214,7 @@ def map_with_rows(
     the room of each object of the map.
     """
     poses = draw_poses(room, images, random)
-    seen = draw_boxes(room, poses, random)
+    seen = draw_boxes(room, poses, random, detector)
     counts = np.bincount(seen.object_row[seen.object_row >= 0], minlength=len(room.class_id))
     known = np.flatnonzero((counts >= 3) | everything)
     mapped = room.select(known)

@@ -12,6 +12,7 @@ from dqslam.assumptions import BoxNoise
 from dqslam.io import FileError
 from dqslam.online import OnlineSlam, StepBoxes, steps_of
 from dqslam.online.maps import load_map
+from small_place import CENTERS, NAMES, boxes_at, pose_at, write_map
 
 NOISE = BoxNoise(pixels=1.0, relative=0.0)
 
@@ -73,6 +74,27 @@ def test_classes_alone_tell_it_too(problem, mapped, again):
     np.testing.assert_allclose(found.pose, known.pose, atol=1e-3)
     shown = found.object_id
     assert (shown[shown >= 0] == np.asarray(boxes.object_id)[shown >= 0]).all()
+
+
+def test_a_camera_in_space_finds_its_way_by_classes(tmp_path):
+    """The robot's pose has the mount of the camera; boxes of another place are refused."""
+    pose, mount = pose_at(1.3, -2.2, 0.9), [0.1, -0.2, 0.3, 0.0, 0.0, np.sin(0.4), np.cos(0.4)]
+    slam = OnlineSlam.load(
+        write_map(tmp_path / "map"), robot_from_camera=mount, pose_model=dq.PoseModel.SE3
+    )
+    count = len(NAMES)
+    found = slam.relocalize(StepBoxes(boxes_at(pose), np.full(count, -1), NAMES))
+    back = _core.inverse(dq.PoseModel.SE3, np.array(mount)[None])
+    robot = _core.compose(dq.PoseModel.SE3, pose[None], back)[0]
+    np.testing.assert_allclose(found.pose[:3], robot[:3], atol=2e-3)
+    assert abs(found.pose[3:] @ robot[3:]) == pytest.approx(1.0, abs=1e-5)
+    np.testing.assert_array_equal(found.object_id, 10 + np.arange(count))
+    moved = CENTERS[np.random.default_rng(3).permutation(count)] * [1.3, 0.7, 2.0]
+    elsewhere = StepBoxes(boxes_at(pose, moved), np.full(count, -1), NAMES)
+    with pytest.raises(ValueError, match="relocalize: (too few|ambiguous): "):
+        slam.relocalize(elsewhere)
+    with pytest.raises(ValueError, match="relocalize: too few: 2 of 2 boxes are of classes"):
+        slam.relocalize(StepBoxes(boxes_at(pose)[:2], [-1, -1], NAMES[:2]))
 
 
 def test_too_few_boxes_are_refused(problem, mapped, again):

@@ -1,15 +1,19 @@
 """What has changed between two maps: what moved, what is gone, and what nobody can tell."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import dqslam as dq
 from dqslam.places.changes_files import distance_and_sigma, read_alignment, write_changes
-from dqslam.places.changes_map import missed
+from dqslam.places.changes_map import SeenMap, missed
 from dqslam.places.visibility import view_objects
 from small_place import CENTERS, NAMES, pose_at, write_map, write_turned
+
+
+IDENTITY = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
 
 
 def status_of(found):
@@ -151,3 +155,25 @@ def test_an_alignment_is_read(tmp_path):
     pose, covariance = read_alignment(path)
     np.testing.assert_array_equal(pose, np.eye(4))
     np.testing.assert_array_equal(covariance, np.eye(6))
+
+
+@pytest.mark.parametrize(("distance", "status"), [(0.05, "unknown"), (0.13, "appeared")])
+def test_a_thing_within_another_of_its_class_may_be_mapped_twice(tmp_path, distance, status):
+    """Cups of 10 to 12 cm do not stand 5 cm from each other; 13 cm are enough."""
+    before = write_map(tmp_path / "a")
+    beside = CENTERS[0] + [distance, 0.0, 0.0]
+    after = write_map(tmp_path / "b", np.vstack([CENTERS, [beside]]), (*NAMES, "cup"))
+    there = status_of(dq.changes(before, after))
+    assert there[None, 18] == status
+    back = status_of(dq.changes(after, before))
+    assert back[18, None] == {"unknown": "unknown", "appeared": "vanished"}[status]
+
+
+def test_objects_within_each_other_reach_past_their_middle(tmp_path):
+    """Spheres of radius 0.1: nearer than 0.75 * 0.2 m, and of one class."""
+    centers = np.array([[0.0, 0.0, 0.0], [0.149, 0.0, 0.0], [0.0, 0.151, 0.0], [0.0, 0.0, 0.05]])
+    names = ("cup", "cup", "cup", "bowl")
+    seen = SeenMap.of(dq.load_results(write_map(tmp_path / "a", centers, names)), IDENTITY)
+    spheres = [dq._core.ellipsoid_from_axes(c, [0.1] * 3, [0.0, 0.0, 0.0, 1.0]) for c in centers]
+    found = replace(seen, centers=centers, ellipsoids=np.array(spheres)).within_each_other()
+    assert np.argwhere(found).tolist() == [[0, 1], [1, 0]]

@@ -75,6 +75,25 @@ def test_boxes_are_left_out_until_few_enough_pairs_are_compared():
     assert len(within_budget(few, np.arange(10), AGREE)[0]) == 10
 
 
+def test_boxes_of_far_too_many_objects_are_not_compared_at_all():
+    """Ten thousand alike, one on a square meter: three boxes have millions of pairs."""
+    pairings = strewn(np.random.default_rng(1), boxes=4, objects=10_000, extent=100.0)
+    boxes, reach = within_budget(pairings, np.arange(4), AGREE)
+    assert (boxes.shape, reach.shape) == ((0,), (0, 0))
+
+
+def test_a_map_of_far_too_many_alike_is_ambiguous():
+    random = np.random.default_rng(0)
+    room = rooms.furnish(100.0, np.full((1, 3), 0.15), np.zeros(10_000, dtype=int), random)
+    place = dq.PlaceMap.of(rooms.map_room(room, 10, random, everything=True))
+    poses = rooms.draw_poses(room, 1, random)
+    boxes = rooms.detections_of(room, rooms.draw_boxes(room, poses, random))
+    found = dq.locate(place, boxes, rooms.CAMERA)
+    assert found.candidates == ()
+    assert found.reason.startswith(f"ambiguous: {len(boxes)} of {len(boxes)} boxes are of classes")
+    assert "too many objects among the 10000 of the map" in found.reason
+
+
 def test_no_box_has_no_reach():
     none = strewn(np.random.default_rng(0), boxes=1, objects=0, extent=1.0)
     boxes, reach = within_budget(none, np.zeros(0, dtype=np.int64), AGREE)

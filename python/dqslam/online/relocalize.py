@@ -8,16 +8,22 @@ import numpy as np
 
 from dqslam import _core
 from dqslam._checks import Floats, Ints
-from dqslam.online.inputs import box_noise_rows, check_boxes
+from dqslam.online.inputs import CheckedBoxes, box_noise_rows, check_boxes
 from dqslam.online.maps import MapOfSession
 from dqslam.online.readout import read_objects
 from dqslam.online.state import State
 from dqslam.online.step import StepBoxes
+from dqslam.places.locate import locate
+from dqslam.places.locate_map import PlaceMap
+from dqslam.places.locate_upright import find_up
+from dqslam.recording import Detections
 
-# The least number of boxes. With ids, it is the number that determines the pose.
-MIN_BOXES_WITH_IDS = {_core.PoseModel.SE2: 2, _core.PoseModel.SE3: 3}
-# With classes alone it is larger, because other objects of a class may fit by chance.
-MIN_BOXES_WITHOUT_IDS = 4
+# The least number of boxes of known objects: it determines the pose.
+MIN_BOXES = {_core.PoseModel.SE2: 2, _core.PoseModel.SE3: 3}
+# Where some boxes have ids and others classes alone, other objects of a class may fit by chance.
+MIN_BOXES_OF_BOTH = 4
+# The least probability of a pose that is found by classes alone.
+MIN_CONFIDENCE = 0.95
 # A pose is ambiguous if the chi-square of another exceeds its own by less than this (2 ln 20).
 MIN_CHI2_MARGIN = 6.0
 # Covariance of an object if it is unknown, m^2 and log meters: about a centimeter.
@@ -56,28 +62,73 @@ def relocalize(state: State, boxes: StepBoxes) -> Relocation:
     settings, objects = state.settings, read_objects(state)
     checked = check_boxes(boxes, settings.camera)
     known = MapOfSession.of(state).covariances()
-    covariances = [known.get(row, _UNKNOWN_COVARIANCE) for row in state.object_rows]
+    covariances = np.array([known.get(row, _UNKNOWN_COVARIANCE) for row in state.object_rows])
+    covariances = covariances.reshape(-1, 9, 9)
     ids, names = objects.object_ids, np.array(objects.class_names, dtype=np.str_)
-    candidates = [
-        np.flatnonzero(ids == one if one >= 0 else names == name).tolist()
-        for one, name in zip(checked.object_id.tolist(), checked.class_name, strict=True)
-    ]
-    have_ids = bool((checked.object_id >= 0).all())
+    shown = checked.object_id
+    if (shown < 0).all() and len(ids) and len(checked.box):
+        shown = _ids_by_classes(state, checked, covariances)
+        candidates = [np.flatnonzero(ids == one).tolist() if one >= 0 else [] for one in shown]
+    else:
+        candidates = [
+            np.flatnonzero(ids == one if one >= 0 else names == name).tolist()
+            for one, name in zip(shown.tolist(), checked.class_name, strict=True)
+        ]
+    are_of_both = bool((checked.object_id >= 0).any() and (checked.object_id < 0).any())
     found = _core.relocalize(
         settings.pose_model,
         settings.camera,
         objects.ellipsoids,
-        np.array(covariances).reshape(-1, 81),
+        covariances.reshape(-1, 81),
         checked.box,
         box_noise_rows(settings.box_noise, checked.box, settings.camera),
         checked.truncated,
         candidates,
-        MIN_BOXES_WITH_IDS[settings.pose_model] if have_ids else MIN_BOXES_WITHOUT_IDS,
+        MIN_BOXES_OF_BOTH if are_of_both else MIN_BOXES[settings.pose_model],
     )
     if found.runner_up < found.chi_square + MIN_CHI2_MARGIN:
         raise ValueError(
             f"relocalize: ambiguous, {found.matches} boxes fit at "
             f"{np.round(found.pose, 2).tolist()} as well as at {np.round(found.other, 2).tolist()}"
         )
-    shown = np.append(ids, -1)[found.object]
-    return Relocation(found.pose, found.covariance, shown, found.chi_square)
+    return Relocation(
+        found.pose, found.covariance, np.append(ids, -1)[found.object], found.chi_square
+    )
+
+
+def _ids_by_classes(state: State, checked: CheckedBoxes, covariances: Floats) -> Ints:
+    """Return the id of the object that each box shows, -1 for none, by the classes; (b,).
+
+    Raises
+    ------
+    ValueError
+        If they do not tell, with the reason.
+    """
+    settings, objects = state.settings, read_objects(state)
+    upright = None
+    if state.core.num_poses:
+        model, camera = settings.pose_model, settings.camera
+        upright = find_up(_core.world_from_camera(model, camera, state.core.poses))
+    place = PlaceMap.of_objects(
+        objects.object_ids,
+        objects.class_names,
+        objects.ellipsoids,
+        covariances,
+        box_noise=settings.box_noise,
+        upright=upright,
+    )
+    names = sorted(set(checked.class_name))
+    count = len(checked.box)
+    detections = Detections(
+        pose=np.zeros(count, dtype=np.int64),
+        box=checked.box,
+        score=np.ones(count),
+        class_id=np.array([names.index(name) for name in checked.class_name], dtype=np.int64),
+        object_id=np.full(count, -1),
+        class_names=dict(enumerate(names)),
+        truncated=checked.truncated,
+    )
+    found = locate(place, detections, settings.camera, min_confidence=MIN_CONFIDENCE)
+    if not found.is_found:
+        raise ValueError(f"relocalize: {found.reason}")
+    return found.object_id

@@ -8,7 +8,7 @@ from typing import Self
 import numpy as np
 
 from dqslam import _core
-from dqslam._checks import Floats, Ints
+from dqslam._checks import Bools, Floats, Ints
 from dqslam.io import MapObjects, Results
 from dqslam.io.results import ellipsoid_covariances
 from dqslam.places.locate_upright import find_up
@@ -20,6 +20,9 @@ FEWEST_BOXES = 3.0
 # An object in view is not mapped for reasons that no look shows: it was joined with another, or
 # was refused.
 UNMAPPED = 0.02
+# Objects nearer than this share of what both reach towards each other are within each other: sizes
+# and centers have errors, and no object is an ellipsoid.
+WITHIN = 0.75
 # Images, at most, whose views are compared, evenly spaced.
 _MOST_IMAGES = 400
 _SE3 = _core.PoseModel.SE3
@@ -109,6 +112,22 @@ class SeenMap:
     def __len__(self) -> int:
         """Return the number of objects."""
         return len(self.object_ids)
+
+    def within_each_other(self) -> Bools:
+        """Return which objects of one class are so near that they reach into each other, (o, o).
+
+        Solid things do not: such a pair is most often one thing that is mapped twice.
+        """
+        apart = self.centers[None] - self.centers[:, None]
+        distance = np.linalg.norm(apart, axis=2)
+        direction = apart / np.maximum(distance, 1e-12)[:, :, None]
+        inverse = np.linalg.inv(_core.ellipsoid_shapes(self.ellipsoids))
+        # How far each object reaches towards each other one.
+        square = np.einsum("abi,aij,abj->ab", direction, inverse, direction)
+        reach = np.maximum(square, 1e-12) ** -0.5
+        names = np.array(self.class_names)
+        near = distance < WITHIN * (reach + reach.T)
+        return np.asarray(near & (names[:, None] == names) & ~np.eye(len(names), dtype=np.bool_))
 
     def looks_at(self, other: SeenMap) -> Floats:
         """Return how many boxes the objects of another map should have had here, shape (o,).

@@ -8,7 +8,7 @@ cameras looked give the likelihood; the assignment with the largest product is c
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -29,6 +29,8 @@ ON_SURFACE, SURFACE_M, OTHER_SURFACE_M = 0.85, 0.03, 0.4
 CERTAIN = 0.95
 # Probability of another class for the same object, if no boxes show how often that happens.
 CONFUSED = 0.02
+# Share of objects within another of their class that are two things, such as a bowl in a bowl.
+DOUBLED = 0.5
 # Share of errors of stayed objects that are larger, and how many times.
 WIDE_SHARE, WIDER = 0.03, 2.5
 
@@ -62,7 +64,25 @@ def match_maps(
     rows = np.flatnonzero((found.second >= 0) & (found.stayed > CERTAIN))
     certain = np.column_stack([rows, found.second[rows]])
     errors = learned_errors(first, second, certain, errors)
-    return _match(first, second, errors, looks_in_second, looks_in_first)
+    found = _match(first, second, errors, looks_in_second, looks_in_first)
+    return _without_doubles(first, second, found)
+
+
+def _without_doubles(first: SeenMap, second: SeenMap, found: Assignment) -> Assignment:
+    """Doubt that objects within others of their class, which both maps have, vanished or appeared.
+
+    One map may have one thing twice, and the other once.
+    """
+    matched = found.second >= 0
+    known = np.zeros(len(second), dtype=np.bool_)
+    known[found.second[matched]] = True
+    doubled = (first.within_each_other() & matched).any(axis=1)
+    doubled_later = (second.within_each_other() & known).any(axis=1)
+    return replace(
+        found,
+        vanished=np.where(doubled, DOUBLED, 1.0) * found.vanished,
+        appeared=np.where(doubled_later, DOUBLED, 1.0) * found.appeared,
+    )
 
 
 def _match(

@@ -16,21 +16,22 @@ from dqslam.io import Results
 from dqslam.io.results import load_map_results
 from dqslam.lens import camera_with, lens_of
 from dqslam.places.landmarks import read_landmarks
-from dqslam.places.locate_boxes import LabeledBoxes, check_labels, label_boxes
+from dqslam.places.locate_boxes import LabeledBoxes, check_labels, label_boxes, labels_of_array
 from dqslam.places.locate_map import ImageBoxes, PlaceMap
 from dqslam.places.locate_score import SE3, Frame
 from dqslam.places.locate_search import Places, find_places
 from dqslam.recording import Detections
 
-# A model of independent errors is too sure of itself: of its log-odds m, this much is right,
-# offset + slope * m, as counted in simulated rooms (docs/locate.md).
-CALIBRATED_OFFSET, CALIBRATED_SLOPE = -2.0, 0.5
+# A model of independent errors is too sure of itself, and the more so the more boxes it takes for
+# independent: of its log-odds m with k matches, offset + slope * m - by_match * ln k is right, as
+# counted in simulated places (docs/locate.md).
+CALIBRATED_OFFSET, CALIBRATED_SLOPE, CALIBRATED_BY_MATCH = 1.3, 0.36, 2.3
 # Images of a sequence that vote, at most: those with the most boxes.
 MOST_IMAGES = 12
 # An image of fewer boxes is left out; a pose of fewer matches is no answer.
 FEWEST_BOXES, FEWEST_MATCHES = 2, 3
 # The largest sigma of a position that is an answer, as a share of the distance of sight.
-MOST_SIGMA = 0.15
+MOST_SIGMA = 0.06
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +98,7 @@ def locate(
     boxes: Detections,
     camera: _core.Camera,
     *,
-    labels: Sequence[Mapping[str, float]] | None = None,
+    labels: Sequence[Mapping[str, float]] | Floats | None = None,
     odometry: ArrayLike | None = None,
     odometry_noise: OdometryNoise | None = None,
     min_confidence: float = 0.9,
@@ -115,7 +116,9 @@ def locate(
     camera
         The camera of the image, which may differ from the map's. Its mount is ignored.
     labels
-        Names of classes that each box may be of, with weights, shape (m,), instead of its class.
+        What each box may be instead of its class: names of classes with weights, shape (m,), or an
+        array of probabilities, shape (m, c), whose columns are the classes of
+        ``boxes.class_names`` by their numbers.
     odometry
         Poses of the camera in a frame of its own, world_from_camera, shape (n, 7), if the boxes are
         of several images: ``boxes.pose`` are rows of it.
@@ -147,6 +150,7 @@ def locate(
     if not 0.0 < min_confidence < 1.0:
         raise ValueError(f"min_confidence is {min_confidence:g}, not between 0 and 1")
     if labels is not None:
+        labels = labels_of_array(labels, boxes)
         check_labels(labels, len(boxes))
     place = known if isinstance(known, PlaceMap) else place_of(known)
     lens = lens_of(camera)
@@ -157,7 +161,7 @@ def locate(
     labeled = [label_boxes(boxes, image, labels) for image in _voters(boxes, images)]
     frames = [
         Frame(
-            ImageBoxes.of(place, bare, one.box, one.truncated, one.labels),
+            ImageBoxes.of(place, bare, one),
             *_offset(poses, int(boxes.pose[one.row[0]]), last, odometry_noise or OdometryNoise()),
         )
         for one in labeled
@@ -227,33 +231,38 @@ def _answer(
         strict=True,
     ):
         shown[labeled[frame].row[box]] = place.object_ids[row]
+    matches = int(first.sum())
     candidates = tuple(
         Candidate(pose, covariance, probability)
         for pose, covariance, probability in zip(
-            places.poses, places.covariance, _probabilities(places), strict=True
+            places.poses, places.covariance, _probabilities(places, matches), strict=True
         )
     )
-    reason = _reason(place, candidates, labeled, int(first.sum()), min_confidence)
+    reason = _reason(place, candidates, places, labeled, matches, min_confidence)
     return Location(reason, candidates, shown, image)
 
 
-def _probabilities(places: Places) -> list[float]:
-    """Return the calibrated probability of each place; the rest is that of no place of these."""
+def _probabilities(places: Places, matches: int) -> list[float]:
+    """Return the calibrated probability of each place; the rest is that of no place of these.
+
+    The best one has so many matches.
+    """
     if not len(places.log_odds):
         return []
     every = np.append(places.log_odds, places.log_elsewhere)
-    margin = every[0] - np.logaddexp.reduce(every[1:])
-    calibrated = float(1.0 / (1.0 + np.exp(-CALIBRATED_OFFSET - CALIBRATED_SLOPE * margin)))
-    # Of equal rivals, each has its share: the calibration is of answers that stand out.
-    share = float(np.exp(every[0] - np.logaddexp.reduce(every)))
-    best = max(calibrated, min(share, 0.5))
-    others = np.exp(every[1:] - np.logaddexp.reduce(every[1:])) * (1.0 - best)
-    return [best, *others[:-1].tolist()]
+    others = np.logaddexp.reduce(every[1:])
+    log_odds = CALIBRATED_OFFSET + CALIBRATED_SLOPE * (every[0] - others)
+    log_odds -= CALIBRATED_BY_MATCH * np.log(max(matches, 1))
+    best = float(1.0 / (1.0 + np.exp(-log_odds)))
+    # A rival is at most as probable as the best one.
+    rivals = np.minimum(np.exp(every[1:-1] - others) * (1.0 - best), best)
+    return [best, *rivals.tolist()]
 
 
 def _reason(
     place: PlaceMap,
     candidates: tuple[Candidate, ...],
+    places: Places,
     labeled: list[LabeledBoxes],
     matches: int,
     min_confidence: float,
@@ -263,14 +272,19 @@ def _reason(
     named = sum(any(name in known for name in names) for one in labeled for names in one.labels)
     total = sum(len(one.row) for one in labeled)
     counted = f"{named} of {total} boxes are of classes in the map"
+    if not candidates and places.is_given_up:
+        return (
+            f"ambiguous: {counted}, but these classes have too many objects among the "
+            f"{len(place.object_ids)} of the map for sizes and distances to tell them apart"
+        )
     if not candidates:
         return f"too few: {counted}, and no three agree about a pose"
     best = candidates[0]
     if matches < FEWEST_MATCHES:
         return f"too few: {counted}, and {matches} show objects at the best pose"
     if best.probability < min_confidence:
-        rivals = sum(one.probability for one in candidates[1:])
-        if rivals > 0.5 * (1.0 - best.probability):
+        rivals = np.logaddexp.reduce(places.log_odds[1:], initial=-np.inf)
+        if rivals > places.log_elsewhere:
             return (
                 f"ambiguous: {_at(best)} with probability {best.probability:.3f}, "
                 f"or {_at(candidates[1])} with {candidates[1].probability:.3f}"

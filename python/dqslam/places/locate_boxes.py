@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dqslam._checks import Bools, Floats, Ints
+from dqslam._checks import Bools, Floats, Ints, as_floats, reject_rows
 from dqslam.recording import Detections
 
 # Boxes of different classes that overlap by this are one box with several labels.
@@ -22,6 +22,8 @@ class LabeledBoxes:
     """Row of each box among all detections, shape (b,); that of the best label of several."""
     box: Floats
     """Undistorted pixels, shape (b, 4)."""
+    score: Floats
+    """Confidence of the detector, shape (b,)."""
     truncated: Bools
     """Shape (b, 4)."""
     labels: list[Mapping[str, float]]
@@ -55,9 +57,32 @@ def label_boxes(
     return LabeledBoxes(
         row=chosen,
         box=detections.box[chosen],
+        score=detections.score[chosen],
         truncated=detections.truncated[chosen],
         labels=[found[place] for place in order.tolist()],
     )
+
+
+def labels_of_array(
+    labels: Sequence[Mapping[str, float]] | Floats, detections: Detections
+) -> Sequence[Mapping[str, float]]:
+    """Return labels that are a table of probabilities as names with weights; others as they are.
+
+    Raises
+    ------
+    ValueError
+        If a table is not of shape (m, c), with a column for each class.
+    """
+    if not isinstance(labels, np.ndarray):
+        return labels
+    names = [detections.class_names[number] for number in sorted(detections.class_names)]
+    table = as_floats("labels", labels, [len(detections), len(names)])
+    reject_rows("labels", table < 0.0, "negative", table)
+    reject_rows("labels", table.max(axis=1, initial=0.0) <= 0.0, "no class is possible", table)
+    return [
+        {names[column]: float(row[column]) for column in np.flatnonzero(row).tolist()}
+        for row in table
+    ]
 
 
 def check_labels(labels: Sequence[Mapping[str, float]], count: int) -> None:

@@ -18,8 +18,8 @@ from dqslam.places.locate_pairs import (
     Pairings,
     agreeing_pairs,
     closed,
-    supported,
     triangles,
+    triples_by_boxes,
     within_budget,
 )
 from dqslam.places.locate_upright import Upright
@@ -30,8 +30,10 @@ _MOST_BOXES = 10
 _ROUNDS, _MOST_CHI2 = 4, 16.0
 # After one round, a larger one does not fall that far.
 _HOPELESS_CHI2 = 50.0
-# Triples, and pairs that stand, at most, in a small and in a large map: the best of more are taken.
-_MOST_TRIPLES, _MOST_TRIPLES_LARGE = 20_000, 3_000
+# Triples that poses are found of, at most, in a small and in a large map.
+_MOST_TRIPLES, _MOST_TRIPLES_LARGE = 16_000, 3_000
+# Poses of triples, and pairs that stand, at most: the best of more are taken.
+_MOST_POSES = 4_000
 # The least sine of the angle of a triple of objects: three in a line determine no pose.
 _LEAST_SINE = 0.1
 
@@ -44,36 +46,47 @@ class Hypotheses:
     """Shape (h, 3, 3)."""
     position: Floats
     """Shape (h, 3)."""
+    is_given_up: bool = False
+    """Whether there are too many objects alike to look for poses."""
 
 
 def find_hypotheses(
     pairings: Pairings, whole: Bools, upright: Upright | None, *, is_large: bool = False
 ) -> Hypotheses:
-    """Find the poses of all pairs and triples that agree; in a large map, of the best supported.
+    """Find the poses of pairs and triples that agree; in a large map, of the best supported.
 
     ``whole`` (b,) are the boxes without cut edges, which are preferred. Pairs need ``upright``.
     """
-    most = _MOST_TRIPLES_LARGE if is_large else _MOST_TRIPLES
     agree = AGREE_LARGE if is_large else AGREE
     boxes, counts = np.unique(pairings.box, return_counts=True)
     chosen = boxes[np.lexsort((counts, ~whole[boxes]))[:_MOST_BOXES]]
-    chosen, reach = within_budget(pairings, chosen, agree)
+    affordable, reach = within_budget(pairings, chosen, agree)
+    is_given_up = len(affordable) < len(chosen) and not len(affordable)
+    chosen = affordable
     pairs = agreeing_pairs(pairings, chosen, reach, agree)
-    triples = triangles(pairs, len(pairings))
-    if is_large and len(triples) > most:
-        triples, pairs = closed(pairings, pairs, triples, most)
-    triples = supported(pairings, pairs, triples, most)
-    found = [_resect(pairings, triples)]
+    if is_large:
+        most = _MOST_TRIPLES_LARGE
+        triples = triangles(pairs, len(pairings))
+        if len(triples) > most:
+            triples, pairs = closed(pairings, pairs, triples, most)
+    else:
+        most = _MOST_POSES
+        triples = triples_by_boxes(pairings, pairs, _MOST_TRIPLES)
+    found = [_resect(pairings, triples, upright)]
     if upright is not None and len(pairs) <= most:
         found.append(_stand(pairings, pairs, upright))
     return Hypotheses(
         np.concatenate([one.rotation for one in found]),
         np.concatenate([one.position for one in found]),
+        is_given_up,
     )
 
 
-def _resect(pairings: Pairings, triples: Ints) -> Hypotheses:
-    """Return the poses of triples (t, 3) whose objects are not in a line and fit their boxes."""
+def _resect(pairings: Pairings, triples: Ints, upright: Upright | None) -> Hypotheses:
+    """Return the poses of triples (t, 3) whose objects are not in a line and fit their boxes.
+
+    Of very many, those that fit best are taken, with regard to how cameras are tilted.
+    """
     different = pairings.object_row[triples]
     triples = triples[(different[:, 0] != different[:, 2])]
     world, ray = pairings.center[triples], pairings.ray[triples]
@@ -81,16 +94,24 @@ def _resect(pairings: Pairings, triples: Ints) -> Hypotheses:
     lengths = np.linalg.norm(one, axis=1) * np.linalg.norm(two, axis=1)
     bent = np.linalg.norm(np.cross(one, two), axis=1) > _LEAST_SINE * lengths
     triples, world, ray = triples[bent], world[bent], ray[bent]
-    _, chi2 = _solve_distances(pairings, triples, rounds=1)
-    hopeful = chi2 < _HOPELESS_CHI2
+    log_distance, chi2 = _solve_distances(pairings, triples, rounds=1)
+    hopeful = np.flatnonzero(chi2 < _HOPELESS_CHI2)
+    if len(hopeful) > 2 * _MOST_POSES:
+        hopeful = hopeful[np.argsort(chi2[hopeful], kind="stable")[: 2 * _MOST_POSES]]
     triples, world, ray = triples[hopeful], world[hopeful], ray[hopeful]
-    log_distance, chi2 = _solve_distances(pairings, triples)
+    log_distance, chi2 = _solve_distances(
+        pairings, triples, rounds=_ROUNDS - 1, begin=log_distance[hopeful]
+    )
     fits = np.flatnonzero(chi2 < _MOST_CHI2)
-    if len(fits) > _MOST_TRIPLES:
-        fits = fits[np.argsort(chi2[fits], kind="stable")[:_MOST_TRIPLES]]
     camera = ray[fits] * np.exp(log_distance[fits])[:, :, None]
     world = world[fits]
     rotation = np.asarray(_frames(world) @ _frames(camera).transpose(0, 2, 1))
+    if len(fits) > _MOST_POSES:
+        misfit = chi2[fits]
+        if upright is not None:
+            misfit = misfit - 2.0 * upright.log_prior(rotation)
+        best = np.argsort(misfit, kind="stable")[:_MOST_POSES]
+        camera, world, rotation = camera[best], world[best], rotation[best]
     middle = np.einsum("tij,tj->ti", rotation, camera.mean(axis=1))
     return Hypotheses(rotation, world.mean(axis=1) - middle)
 
@@ -126,11 +147,12 @@ def _stand(pairings: Pairings, pairs: Ints, upright: Upright) -> Hypotheses:
 
 
 def _solve_distances(
-    pairings: Pairings, groups: Ints, *, rounds: int = _ROUNDS
+    pairings: Pairings, groups: Ints, *, rounds: int = _ROUNDS, begin: Floats | None = None
 ) -> tuple[Floats, Floats]:
     """Find the distances whose differences are the map's, near those of the apparent sizes.
 
-    The groups (t, k) are pairs or triples. Return the logarithms of the distances (t, k) and the
+    The groups (t, k) are pairs or triples. Newton's method begins at those of the apparent sizes or
+    at ``begin`` (t, k), logarithms. Return the logarithms of the distances (t, k) and the
     chi-square of each group (t,).
     """
     start, sigma = pairings.log_distance[groups], pairings.sigma[groups]
@@ -139,7 +161,7 @@ def _solve_distances(
     cosine = (ray[:, first] * ray[:, second]).sum(axis=2)
     known = np.linalg.norm(world[:, first] - world[:, second], axis=2)
     relative = 0.5 * np.maximum(blur[:, first], blur[:, second])
-    log_distance = start.copy()
+    log_distance = start if begin is None else begin
     for last in [False] * rounds + [True]:
         distance = np.exp(log_distance)
         a, b = distance[:, first], distance[:, second]

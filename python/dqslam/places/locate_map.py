@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Self
 
@@ -11,11 +10,13 @@ import numpy as np
 
 from dqslam import _core
 from dqslam._checks import Bools, Floats, Ints
+from dqslam.assumptions import BoxNoise
 from dqslam.io import MapObjects, Results
 from dqslam.io.results import ellipsoid_covariances
 from dqslam.io.results.map_covariances import UNKNOWN_LOG_SIGMA
 from dqslam.lens import cut_edges
 from dqslam.places.landmarks import Landmarks
+from dqslam.places.locate_boxes import LabeledBoxes
 from dqslam.places.locate_upright import Upright, find_up
 from dqslam.places.sensor import Sensor, assumed_sensor, learn_sensor
 
@@ -86,6 +87,34 @@ class PlaceMap:
         )
 
     @classmethod
+    def of_objects(
+        cls,
+        object_ids: Ints,
+        class_names: tuple[str, ...],
+        ellipsoids: Floats,
+        covariances: Floats,
+        *,
+        box_noise: BoxNoise | None = None,
+        upright: Upright | None = None,
+    ) -> Self:
+        """Prepare ellipsoids (o, 9) alone, of covariances (o, 9, 9).
+
+        Rates of detection are assumed, and so is the noise of boxes unless it is given.
+        """
+        shapes = _core.ellipsoid_shapes(ellipsoids)
+        size = float(np.sqrt(np.linalg.eigvalsh(shapes)).mean())
+        sensor = assumed_sensor(class_names, _ASSUMED_SIGHT * size)
+        return cls(
+            object_ids=object_ids,
+            class_names=class_names,
+            ellipsoids=ellipsoids,
+            covariances=covariances,
+            sensor=sensor if box_noise is None else replace(sensor, noise=box_noise),
+            upright=upright,
+            seen_from=np.full((len(ellipsoids), 0, 3), np.nan),
+        )
+
+    @classmethod
     def of_landmarks(cls, landmarks: Landmarks) -> Self:
         """Prepare objects alone, of a CSV or a ``map.json``: rates of detection are assumed.
 
@@ -119,14 +148,11 @@ class PlaceMap:
             center_covariances=landmarks.covariances[rows],
             log_semi_axes_sigmas=sigmas,
         )
-        return cls(
-            object_ids=objects.object_ids,
-            class_names=objects.class_names,
-            ellipsoids=objects.ellipsoids,
-            covariances=ellipsoid_covariances(objects, np.arange(len(rows))),
-            sensor=assumed_sensor(objects.class_names, _ASSUMED_SIGHT * float(axes.mean())),
-            upright=None,
-            seen_from=np.full((len(rows), 0, 3), np.nan),
+        return cls.of_objects(
+            objects.object_ids,
+            objects.class_names,
+            objects.ellipsoids,
+            ellipsoid_covariances(objects, np.arange(len(rows))),
         )
 
     @cached_property
@@ -217,11 +243,10 @@ class ImageBoxes:
         cls,
         place: PlaceMap,
         camera: _core.Camera,
-        box: Floats,
-        truncated: Bools,
-        labels: Sequence[Mapping[str, float]],
+        labeled: LabeledBoxes,
     ) -> Self:
-        """Compare boxes (b, 4) and the weights of their labels with a map."""
+        """Compare boxes and the weights of their labels with a map."""
+        box, labels = labeled.box, labeled.labels
         sensor, count = place.sensor, len(place.sensor.labels)
         column = {name: row for row, name in enumerate(sensor.labels)}
         weight = np.zeros((len(box), count + 1))
@@ -232,12 +257,12 @@ class ImageBoxes:
         # A label that no object ever had is as likely as the least of the others.
         unknown = sensor.log_label.min(axis=1, keepdims=True)
         table = np.exp(np.hstack([sensor.log_label, unknown]))
-        cut = truncated | cut_edges(camera, box)
+        cut = labeled.truncated | cut_edges(camera, box)
         false = np.log(weight @ np.exp(sensor.log_false_label) * sensor.false_boxes)
         other = np.log(weight @ np.exp(sensor.log_any_label) * sensor.all_boxes)
         return cls(
             box=box,
-            covariance=sensor.box_covariance(box, camera),
+            covariance=sensor.box_covariance(box, labeled.score, camera),
             truncated=cut,
             log_label=np.log(weight @ table.T),
             log_false=false + _log_density(camera, box, cut),

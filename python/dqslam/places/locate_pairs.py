@@ -7,6 +7,7 @@ two objects from each other, which the map knows: most wrong pairs contradict it
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
+from itertools import combinations
 from typing import Self
 
 import numpy as np
@@ -19,6 +20,9 @@ from dqslam.places.locate_map import ImageBoxes, PlaceMap
 _LEAST_LABEL = 0.1
 # Pairs of objects that boxes are compared with, about, and the boxes that are left in any case.
 _MOST_COMPARED, _FEWEST_BOXES = 100_000, 3
+# If even these boxes would be compared with more pairs, so many agree by chance that sizes and
+# distances do not tell the objects apart.
+_HOPELESS = 2_000_000
 # Sigmas within which distances agree in a small and in a large map, where many do by chance.
 AGREE, AGREE_LARGE = 3.0, 2.0
 # Relative error of a distance between objects, from their centers in the image and in the map, and
@@ -28,6 +32,8 @@ _DISTANCE_SIGMA, _CUT_SIGMA = 0.05, 0.15
 _CUT_SIZE_SIGMA = 0.4
 # Pairs that follow one another, at most, among which triples are looked for.
 _MOST_CHAINS = 1_000_000
+# A triple of boxes is this much less preferred for each time that each of its boxes was taken.
+_USED_AGAIN = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,8 +114,8 @@ def within_budget(pairings: Pairings, boxes: Ints, agree: float) -> tuple[Ints, 
     """Return as many of the boxes (b,) as the search has time for, and their reaches (b, b).
 
     Among thousands of objects of one class, boxes of objects that are near each other are compared
-    with few pairs of objects. At least three boxes are returned. ``agree`` are the sigmas within
-    which distances agree.
+    with few pairs of objects. At least three boxes are returned; or none, if these are too many
+    even for them. ``agree`` are the sigmas within which distances agree.
     """
     if not len(boxes):
         return boxes, np.zeros((0, 0))
@@ -122,6 +128,8 @@ def within_budget(pairings: Pairings, boxes: Ints, agree: float) -> tuple[Ints, 
     kept = list(range(len(boxes)))
     while len(kept) > _FEWEST_BOXES and cost[np.ix_(kept, kept)].sum() > 2.0 * _MOST_COMPARED:
         kept.pop(int(cost[np.ix_(kept, kept)].sum(axis=1).argmax()))
+    if cost[np.ix_(kept, kept)].sum() > 2.0 * _HOPELESS:
+        kept = []
     return boxes[kept], reach[np.ix_(kept, kept)]
 
 
@@ -199,12 +207,33 @@ def closed(pairings: Pairings, pairs: Ints, triples: Ints, most: int) -> tuple[I
     return triples[best], np.column_stack([strong // count, strong % count])
 
 
-def supported(pairings: Pairings, pairs: Ints, groups: Ints, most: int) -> Ints:
-    """Keep the groups (t, k) whose pairings agree with most other boxes, if there are very many."""
-    if len(groups) <= most:
-        return groups
-    agrees = np.zeros((len(pairings), int(pairings.box.max()) + 1), dtype=np.bool_)
-    for one, other in ((0, 1), (1, 0)):
-        agrees[pairs[:, one], pairings.box[pairs[:, other]]] = True
-    support = agrees.sum(axis=1)[groups].sum(axis=1)
-    return groups[np.argsort(-support, kind="stable")[:most]]
+def triples_by_boxes(pairings: Pairings, pairs: Ints, most: int) -> Ints:
+    """Return triangles of pairs, (t, 3), of some triples of boxes; about ``most`` of all.
+
+    Among many objects of a class, most triples agree by chance, and nothing tells the right ones
+    from these before poses are compared with the other boxes. All triples of a few boxes contain
+    the right one, if these boxes show objects of the map: several triples of boxes are taken, those
+    of few objects first, and others than before.
+    """
+    count = len(pairings)
+    boxes = np.unique(pairings.box[pairs])
+    box = np.searchsorted(boxes, pairings.box[pairs])
+    number = np.zeros((len(boxes), len(boxes)))
+    np.add.at(number, (box[:, 0], box[:, 1]), 1.0)
+    objects = np.bincount(np.searchsorted(boxes, pairings.box[np.isin(pairings.box, boxes)]))
+    left = np.array(list(combinations(range(len(boxes)), 3)), dtype=np.int64).reshape(-1, 3)
+    sides = [number[left[:, i], left[:, j]] for i, j in ((0, 1), (1, 2), (0, 2))]
+    expected = np.prod(sides, axis=0) / np.maximum(objects[left].prod(axis=1), 1)
+    used = np.zeros(len(boxes))
+    found, total = [np.zeros((0, 3), dtype=np.int64)], 0
+    left, expected = left[expected > 0.0], expected[expected > 0.0]
+    while len(left) and total < most:
+        best = int(np.argmin(expected * _USED_AGAIN ** used[left].sum(axis=1)))
+        own = np.isin(box, left[best]).all(axis=1)
+        found.append(triangles(pairs[own], count))
+        if len(found[-1]) > most:  # evenly spaced ones: they are in the order of the objects
+            found[-1] = found[-1][:: -(-len(found[-1]) // most)]
+        total += len(found[-1])
+        used[left[best]] += 1.0
+        left, expected = np.delete(left, best, axis=0), np.delete(expected, best)
+    return np.concatenate(found)

@@ -38,21 +38,29 @@ def _score_all(place: PlaceMap, pairings: Pairings, gain: Floats, found: Hypothe
     """Compare each hypothesis with all pairings."""
     box = pairings.box
     half = np.exp(place.size[pairings.object_row, 0] - pairings.log_distance)
-    sigma_ray = np.hypot(_RAY_SIGMA, _RAY_SHARE * half)
+    precision_ray = 1.0 / np.hypot(_RAY_SIGMA, _RAY_SHARE * half)[:, None] ** 2
+    precision = 1.0 / pairings.sigma[:, None]
     first = np.flatnonzero(np.concatenate([[True], box[1:] != box[:-1]]))
+    rows, row = np.unique(pairings.object_row, return_inverse=True)
+    # Near the middle of the map, squares of coordinates lose no digits of distances.
+    middle = place.ellipsoids[rows, :3].mean(axis=0)
+    center = place.ellipsoids[rows, :3] - middle
+    # ray . R^T (center - position), as products of matrices of pairings with those of hypotheses
+    outer = ((pairings.center - middle)[:, :, None] * pairings.ray[:, None, :]).reshape(-1, 9)
     score = np.zeros(len(found.position))
     chunk = max(1, _MOST_CELLS // len(box))
     for start in range(0, len(score), chunk):
         part = slice(start, start + chunk)
-        rotation, position = found.rotation[part], found.position[part]
-        offset = np.einsum("hi,hij->hj", position, rotation)
-        inside = np.einsum("ni,hij->hnj", pairings.center, rotation) - offset[:, None, :]
-        distance = np.sqrt((inside**2).sum(axis=2))
-        cosine = (inside * pairings.ray).sum(axis=2) / distance
-        error = 2.0 * (1.0 - cosine) / sigma_ray**2
-        error += ((np.log(distance) - pairings.log_distance) / pairings.sigma) ** 2
-        own = np.maximum(gain - 0.5 * error, 0.0)
-        score[part] = np.maximum.reduceat(own, first, axis=1).sum(axis=1)
+        rotation, position = found.rotation[part], found.position[part] - middle
+        ahead = outer @ rotation.reshape(-1, 9).T
+        ahead -= pairings.ray @ (position[:, None, :] @ rotation)[:, 0].T
+        square = -2.0 * (center @ position.T)
+        square += (center**2).sum(axis=1)[:, None] + (position**2).sum(axis=1)
+        log_distance = 0.5 * np.log(np.maximum(square, 1e-12))
+        ahead *= np.exp(-log_distance)[row]
+        error = (log_distance[row] - pairings.log_distance[:, None]) * precision
+        own = gain[:, None] - precision_ray * (1.0 - ahead) - 0.5 * error**2
+        score[part] = np.maximum(np.maximum.reduceat(own, first, axis=0), 0.0).sum(axis=0)
     return score
 
 

@@ -49,17 +49,20 @@ class Places:
     """Objects that each expects in vain, shape (p,)."""
     log_elsewhere: float
     """Likewise of another place."""
+    is_given_up: bool = False
+    """Whether there are too many objects alike in the map to look for places."""
 
 
 def find_places(place: PlaceMap, camera: _core.Camera, frames: list[Frame]) -> Places:
     """Find the places, none if no three boxes agree."""
     starts = [_starts(place, camera, frame) for frame in frames]
-    poses = np.concatenate([np.zeros((0, 7)), *starts])
+    poses = np.concatenate([np.zeros((0, 7)), *[one for one, _ in starts]])
     elsewhere = sum(frame.boxes.log_elsewhere for frame in frames)
     if not len(poses):
         none = np.zeros(0, dtype=np.int64)
         matches = Matches(none, none, none, none)
-        return Places(poses, np.zeros(0), np.zeros((0, 6, 6)), matches, none, elsewhere)
+        given_up = any(one for _, one in starts)
+        return Places(poses, np.zeros(0), np.zeros((0, 6, 6)), matches, none, elsewhere, given_up)
     scorer = Scorer(place, camera, frames)
     scored = scorer.score(poses)
     is_large = len(place.ellipsoids) > MOST_OBJECTS
@@ -145,8 +148,11 @@ def distinct(
     return order[np.array(chosen, dtype=np.int64)]
 
 
-def _starts(place: PlaceMap, camera: _core.Camera, frame: Frame) -> Floats:
-    """Return the best hypotheses of an image as poses of the reference image, shape (h, 7)."""
+def _starts(place: PlaceMap, camera: _core.Camera, frame: Frame) -> tuple[Floats, bool]:
+    """Return the best hypotheses of an image as poses of the reference image, shape (h, 7).
+
+    Also return whether the search was given up.
+    """
     from scipy.spatial.transform import Rotation
 
     image = frame.boxes
@@ -155,6 +161,7 @@ def _starts(place: PlaceMap, camera: _core.Camera, frame: Frame) -> Floats:
     is_large = len(place.ellipsoids) > MOST_OBJECTS
     most = _MOST_QUICK_LARGE if is_large else _MOST_QUICK
     found = find_hypotheses(pairings, whole, place.upright, is_large=is_large)
+    given_up = found.is_given_up
     found = _strongest(found, place.sensor.sight, most)
     score = quick_score(place, image, pairings, found)
     if place.upright is not None:
@@ -164,7 +171,7 @@ def _starts(place: PlaceMap, camera: _core.Camera, frame: Frame) -> Floats:
     poses = np.column_stack([found.position[best], np.reshape(quaternion, (-1, 4))])
     poses = poses[distinct(poses, score[best], place.sensor.sight, _MOST_SCORED)]
     back = _core.inverse(SE3, frame.reference_from_image[None])
-    return _core.compose(SE3, poses, np.tile(back, (len(poses), 1)))
+    return _core.compose(SE3, poses, np.tile(back, (len(poses), 1))), given_up
 
 
 def _strongest(found: Hypotheses, sight: float, most: int) -> Hypotheses:

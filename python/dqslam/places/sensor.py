@@ -31,6 +31,9 @@ ASSUMED_RATE, ASSUMED_FALSE, ASSUMED_CONFUSION = 0.6, 1.0, 0.05
 ASSUMED_ALL, LEAST_FALSE = 8.0, 0.5
 # Images, at most, from which is learned, evenly spaced.
 MOST_IMAGES = 300
+# Parts of the boxes, by score, whose variances are compared; the least range of scores that tells
+# anything, and the most that a score changes a variance by.
+_SCORE_PARTS, _LEAST_RANGE, _MOST_BY_SCORE = 8, 0.1, 4.0
 # Boxes as which an assumed rate counts.
 _PRIOR_BOXES = 4.0
 
@@ -43,6 +46,10 @@ class Sensor:
     """Of the edges of boxes of objects at their places."""
     correlation: float
     """Between the errors of opposite edges: a box is rather shifted than too large."""
+    score_slope: float
+    """Boxes of a low score err more: the logarithm of the variance falls by this per unit of it."""
+    usual_score: float
+    """Score of boxes whose noise is ``noise``."""
     false_boxes: float
     """Mean number of boxes an image that show no object of the map."""
     all_boxes: float
@@ -62,9 +69,11 @@ class Sensor:
     sight: float
     """Distance within which objects are seen, meters."""
 
-    def box_covariance(self, box: Floats, camera: _core.Camera) -> Floats:
-        """Return the covariance [px^2] of the edges of boxes (b, 4), shape (b, 4, 4)."""
-        covariance = self.noise.covariance(box, camera)
+    def box_covariance(self, box: Floats, score: Floats, camera: _core.Camera) -> Floats:
+        """Return the covariance [px^2] of the edges of boxes (b, 4) of scores (b,), (b, 4, 4)."""
+        factor = np.exp(self.score_slope * (self.usual_score - score))
+        factor = np.clip(factor, 1.0 / _MOST_BY_SCORE, _MOST_BY_SCORE)
+        covariance = factor[:, None, None] * self.noise.covariance(box, camera)
         sigma = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
         for low in (0, 1):
             both = self.correlation * sigma[:, low] * sigma[:, low + 2]
@@ -93,6 +102,8 @@ def assumed_sensor(class_names: tuple[str, ...], sight: float) -> Sensor:
     return Sensor(
         noise=BoxNoise(),
         correlation=0.0,
+        score_slope=0.0,
+        usual_score=1.0,
         false_boxes=ASSUMED_FALSE,
         all_boxes=ASSUMED_ALL,
         labels=labels,
@@ -132,10 +143,12 @@ def learn_sensor(
     used = used[:: -(-max(len(used), 1) // 5000)]
     object_in_view = ellipsoids[shown[shown >= 0], :3] - poses[boxes.pose[shown >= 0], :3]
     distance = np.linalg.norm(object_in_view, axis=1)
-    noise, correlation = _learn_noise(camera, poses, boxes, ellipsoids, used, shown)
+    noise, correlation, slope = _learn_noise(camera, poses, boxes, ellipsoids, used, shown)
     return Sensor(
         noise=noise,
         correlation=correlation,
+        score_slope=slope,
+        usual_score=float(np.mean(boxes.score[used])) if len(used) else 1.0,
         false_boxes=max(float(np.sum(shown < 0)) / count, LEAST_FALSE),
         all_boxes=len(boxes) / count,
         labels=labels,
@@ -201,10 +214,11 @@ def _learn_noise(
     ellipsoids: Floats,
     used: Ints,
     shown: Ints,
-) -> tuple[BoxNoise, float]:
+) -> tuple[BoxNoise, float, float]:
     """Fit the two parts of the noise to robust variances of edges, by the sides of their boxes.
 
-    Also return the correlation of opposite edges.
+    Also return the correlation of opposite edges, and by how much the logarithm of the variance
+    falls per unit of the score.
     """
     from scipy.optimize import nnls
 
@@ -213,7 +227,7 @@ def _learn_noise(
     )
     used, box = used[front], box[front]
     if len(used) < 50:
-        return BoxNoise(), 0.0
+        return BoxNoise(), 0.0, 0.0
     measured = boxes.box[used]
     error = (measured - box).ravel()
     side = np.tile(measured[:, 2:] - measured[:, :2], (1, 2)).ravel()
@@ -228,4 +242,19 @@ def _learn_noise(
     sigma = np.sqrt(np.diagonal(noise.covariance(measured), axis1=1, axis2=2))
     whitened = np.clip((measured - box) / sigma, -3.0, 3.0)
     both = float(np.mean(whitened[:, :2] * whitened[:, 2:]) / np.mean(whitened**2))
-    return noise, float(np.clip(both, 0.0, 0.8))
+    slope = _learn_score_slope(whitened, boxes.score[used])
+    return noise, float(np.clip(both, 0.0, 0.8)), slope
+
+
+def _learn_score_slope(whitened: Floats, score: Floats) -> float:
+    """Return by how much the logarithm of the variance of errors (m, 4) falls per unit of score.
+
+    0 if it does not fall, or if the scores (m,) are alike.
+    """
+    parts = np.array_split(np.argsort(score, kind="stable"), _SCORE_PARTS)
+    mean = np.array([score[rows].mean() for rows in parts])
+    if np.ptp(mean) < _LEAST_RANGE:
+        return 0.0
+    variance = np.array([np.median(whitened[rows] ** 2) for rows in parts])
+    slope = np.polyfit(mean, np.log(np.maximum(variance, 1e-6)), 1)[0]
+    return max(0.0, -float(slope))
