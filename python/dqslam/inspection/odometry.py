@@ -110,8 +110,8 @@ def note_jumps(evidence: Evidence) -> list[str]:
             row = int(rows[np.argmax(steps[rows])])
             notes.append(
                 f"the odometry {what} {rows.size} time{'s' if rows.size > 1 else ''}: at "
-                f"{seconds_of(times[row])} s it moves by {steps[row]:.3g} m in {seconds[row]:.3g} s, "
-                f"usually by {odd.usual:.2g} m at most. If it was lost there, "
-                "--odometry-covariance says how uncertain that step is"
+                f"{seconds_of(times[row])} s it moves by {steps[row]:.3g} m in "
+                f"{seconds[row]:.3g} s, usually by {odd.usual:.2g} m at most. If it was lost "
+                "there, --odometry-covariance says how uncertain that step is"
             )
     return notes

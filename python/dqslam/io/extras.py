@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -47,8 +47,8 @@ class Extras:
         ):
             if path is not None:
                 measured = guarded(path, f"CSV of {name}", read, path, *near)
-                measured = _of_part(measured, len(before), len(times))
-                recording = replace(recording, **{name: measured})
+                changes: dict[str, Any] = {name: _of_part(measured, len(before), len(times))}
+                recording = replace(recording, **changes)
         return recording
 
 

@@ -115,7 +115,8 @@ def read_boxes_file(
     """Read the boxes of a recording, for an image of this width and height in px.
 
     They are read as they are meant before they are checked and cut. Their frames may be those of a
-    trajectory, the whole one. Boxes of the whole time are returned. ``classes``, ``cut``, ``check`` and ``min_score`` are those of ``read_detections``.
+    trajectory, the whole one. Boxes of the whole time are returned. ``classes``, ``cut``, ``check``
+    and ``min_score`` are those of ``read_detections``.
     """
     readings = options.readings
     if size is None and readings.boxes.image is not None:

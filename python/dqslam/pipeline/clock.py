@@ -38,7 +38,7 @@ MOST_ROUNDS = 4
 
 @dataclass(frozen=True)
 class CoarseOffset:
-    """Where the estimate of an offset of time begins: how much later images are than their times."""
+    """Where the estimate of an offset of time begins: how much later images are than told."""
 
     seconds: float = 0.0
     sigma: float = 0.0  #: of it, if it is final; else what is added to that of the estimate
@@ -47,18 +47,16 @@ class CoarseOffset:
 
     def added_to(self, output: EstimatorOutput) -> EstimatorOutput:
         """Return an output whose estimated offset is that from the times as given."""
-        found = tuple(
-            replace(
-                one, value=one.value + self.seconds, sigma=float(np.hypot(one.sigma, self.sigma))
-            )
-            if one.name == _NAME
-            else one
-            for one in output.estimated
-        )
+        found = tuple(self._whole(one) if one.name == _NAME else one for one in output.estimated)
         if self.is_final:
             unit = parameter_units()[calibration_parameters().index(_NAME)]
             found = (*found, CalibrationFinding(_NAME, self.seconds, self.sigma, unit))
         return replace(output, estimated=found, remarks=(*output.remarks, *self.remarks))
+
+    def _whole(self, rest: CalibrationFinding) -> CalibrationFinding:
+        """Return the offset from the times as given, from what was left to estimate."""
+        sigma = float(np.hypot(rest.sigma, self.sigma))
+        return replace(rest, value=rest.value + self.seconds, sigma=sigma)
 
 
 def with_clock(
@@ -78,24 +76,27 @@ def with_clock(
     if _NAME not in asked or len(images) < 2:
         return recording, options, CoarseOffset()
     interval = float(np.median(np.diff(images)))
-    total, remarks = 0.0, []
-    for _ in range(MOST_ROUNDS):
+    total = 0.0
+    remarks: dict[str, None] = {}
+    for number in range(1, MOST_ROUNDS + 1):
         bare = replace(recording, positions=None, measurements=(), absolute=None, closures=None)
         output = estimator(bare, options, progress)
         graph = kept_problem(output, bare, options.mode)
         if graph is None:
-            return recording, options, CoarseOffset(total, 0.0, False, tuple(remarks))
+            return recording, options, CoarseOffset(total, remarks=tuple(remarks))
         state = state_of(output, graph)
         found = find_clock_error(graph, state)
         if found is None or not found.is_sure or abs(found.seconds) < interval / 2:
+            is_final, sigma = _choose(graph, state, options, found)
             break
         if found.rate:
-            remarks = [str(found)]
+            remarks[str(found)] = None
+        if number == MOST_ROUNDS:
+            remarks[f"the offset of time does not stand still in {MOST_ROUNDS} rounds"] = None
+            is_final, sigma = True, abs(found.seconds)
+            break
         step = interval * round(found.seconds / interval)
         recording, total = with_delay(recording, step), total + step
-    else:
-        remarks.append(f"the offset of time does not stand still in {MOST_ROUNDS} rounds")
-    is_final, sigma = _choose(graph, state, options, found)
     if is_final and found is not None:
         recording, total = with_delay(recording, found.seconds), total + found.seconds
         options = replace(options, estimate=tuple(name for name in asked if name != _NAME))
