@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -100,7 +100,7 @@ def warn_of_bent_poses(marginals: Marginals | None) -> list[str]:
     ]
 
 
-def warn_of_calibration(findings: tuple[CalibrationFinding, ...]) -> list[str]:
+def warn_of_calibration(findings: Iterable[CalibrationFinding]) -> list[str]:
     """Warn of deviations from the calibration that even repeated errors of boxes do not explain."""
     return [str(finding) for finding in findings if finding.sigmas > SURE_OF_CALIBRATION]
 
