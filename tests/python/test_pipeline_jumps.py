@@ -35,6 +35,17 @@ def test_objects_that_are_there_twice_are_told():
     [doubt] = doubt_torn(*torn(), np.array([9.0]))
     assert "jumps at 9 s, and 8 objects are in the map twice" in doubt
     assert "5 m away" in doubt  # 3 and 4 m along two axes
+    [(turn, x, y, z)] = re.findall(r"turned by (\S+) deg and moved by (\S+) (\S+) (\S+) m", doubt)
+    assert float(turn) == pytest.approx(0.0, abs=1e-3)
+    np.testing.assert_allclose([float(x), float(y), float(z)], [3.0, 4.0, 0.0], atol=1e-3)
+    assert "with --until 9 and with --from 10, and join their maps by `dqslam merge`" in doubt
+
+
+def test_times_since_1970_are_said_to_the_microsecond():
+    both, times, seen = torn()
+    [doubt] = doubt_torn(both, times + 1.7e9 + 0.25, seen, np.array([9.25 + 1.7e9]))
+    assert "jumps at 1700000009.25 s" in doubt
+    assert "--until 1700000009.25 and with --from 1700000010.25" in doubt
 
 
 def test_each_jump_is_told():

@@ -24,6 +24,7 @@ from dqslam.association.thinning import fill_in, thin_recording
 from dqslam.association.tracklets import link_tracklets
 from dqslam.assumptions import BoxNoise, SizePrior, SizePriors
 from dqslam.graph import Graph, build_graph
+from dqslam.io.span import seconds
 from dqslam.recording import Recording
 
 # Trust in ids that are final, and the most where they are not: of tracklets that are linked in the
@@ -242,7 +243,7 @@ def describe_jumps(scene: SceneMap) -> list[str]:
     """Say which steps of the odometry are jumps."""
     times = scene.recording.timestamps
     return [
-        f"the odometry jumps before {times[step + 1]:.6g} s: its noise is believed to be "
+        f"the odometry jumps before {seconds(times[step + 1])} s: its noise is believed to be "
         f"{np.sqrt(scene.inflation[step]):.3g} times that of other steps"
         for step in np.flatnonzero(scene.inflation > 1.0).tolist()
     ]

@@ -68,6 +68,32 @@ def scores_at(
     return replace(scores, score=score, information=information, covariance=covariance)
 
 
+def one_sided(
+    graph: Graph, state: _core.State, options: _core.SolveOptions
+) -> tuple[float, float, float]:
+    """Return the offset by the motion after each pose, by that before it, and their sigma [s].
+
+    Errors of boxes move poses, and with them the motion that a delay goes along. What that does to
+    an estimate has the opposite sign on both sides: where these contradict each other, the estimate
+    is no better than half of their difference.
+
+    Raises
+    ------
+    ValueError
+        If boxes do not determine it.
+    """
+    row = calibration_parameters().index("time_offset")
+    values, sigmas = [], []
+    for is_late in (True, False):
+        scores = scores_at(graph, state, options, [row], is_late=is_late)
+        information = float(scores.information[row, row])
+        if not information > 0.0:
+            raise ValueError("calibration: the data do not determine time_offset")
+        values.append(float(scores.score[row]) / information)
+        sigmas.append(float(np.sqrt(scores.covariance[row, row])) / information)
+    return values[0], values[1], max(sigmas)
+
+
 def are_late(
     graph: Graph, state: _core.State, options: _core.SolveOptions, rows: Sequence[int]
 ) -> bool:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from dqslam._outputs import added_files, check_added
+from dqslam.cli.options import FromTime, UntilTime, given_span
 from dqslam.cli.output import Json, Output, Quiet
 from dqslam.cli.settings import ConfigFile, save_settings
 
@@ -60,11 +61,15 @@ def evaluate(
             help="Most seconds between compared poses. Default: half the interval of poses."
         ),
     ] = None,
+    since: FromTime = None,
+    until: UntilTime = None,
     config: ConfigFile = None,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
     """Compare the trajectory, the objects and the boxes of DIR with the truth.
+
+    With --from and --until, only poses of that time are compared, and the boxes of the whole.
 
     Writes evaluation.json, and the options as evaluation.toml, into DIR. docs/evaluation.md
     describes each number.
@@ -78,12 +83,13 @@ def evaluate(
         raise ValueError(f"--max-time-difference: {max_time_difference:g} is negative")
     output = Output(quiet=quiet, as_json=json)
     inputs = (groundtruth, objects, boxes)
+    span = given_span(since, until)
     if directory.is_dir():
         check_added(directory, _WRITTEN, "dqslam evaluate", inputs=inputs)
     with output.steps("evaluating", 3) as done:
         results = io.load_results(directory)
         done()
-        truth = io.read_trajectory(groundtruth, repeated_times=True)
+        truth = span.of_path(io.read_trajectory(groundtruth, repeated_times=True), groundtruth)
         done()
         evaluation = evaluate_results(
             results,

@@ -63,6 +63,7 @@ def inspect(
         done()
         size = (lens.width, lens.height)
         table = io.read_boxes_file(detections, size, reading, notes, trajectory=path, check=False)
+        path, table = reading.span.of_path(path, odometry), reading.span.of_boxes(table)
         done()
         latest = reading.max_time_difference
         linked = None if ids == "none" else ids

@@ -1,12 +1,13 @@
 """Options that several commands share: times of frames, results, trials."""
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 if TYPE_CHECKING:
-    from dqslam.io import FrameTimes
+    from dqslam.io import FrameTimes, TimeSpan
 
 FrameTimesFile = Annotated[
     Path | None,
@@ -18,6 +19,18 @@ FrameRate = Annotated[
         metavar="HZ",
         help="Frames per second, with frame 0 at 0 s. Default: --frame-times or the files.",
     ),
+]
+FromTime = Annotated[
+    float | None,
+    typer.Option(
+        "--from",
+        metavar="SECONDS",
+        help="Leave out what is before this time, by the clock of the poses.",
+    ),
+]
+UntilTime = Annotated[
+    float | None,
+    typer.Option(metavar="SECONDS", help="Leave out what is after this time, by the same clock."),
 ]
 ResultDirectory = Annotated[
     Path,
@@ -63,6 +76,16 @@ Alignment = Annotated[
     Literal["se3", "sim3", "se2", "none"],
     typer.Option(help="Motion between both worlds: rigid, with scale, on the plane, or none."),
 ]
+
+
+def given_span(since: float | None, until: float | None) -> "TimeSpan":
+    """Return the part of the time that these two options leave, all of it without either."""
+    from dqslam import io
+
+    begin, end = -math.inf if since is None else since, math.inf if until is None else until
+    if not begin <= end:
+        raise ValueError(f"--from {begin:g} is not before --until {end:g}")
+    return io.TimeSpan(begin, end)
 
 
 def given_frame_times(table: Path | None, rate: float | None) -> "FrameTimes | None":

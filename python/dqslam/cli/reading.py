@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING, Annotated, Literal, TypeVar
 
 import typer
 
-from dqslam.cli.options import FrameRate, FrameTimesFile, given_frame_times
+from dqslam.cli.options import (
+    FrameRate,
+    FrameTimesFile,
+    FromTime,
+    UntilTime,
+    given_frame_times,
+    given_span,
+)
 
 if TYPE_CHECKING:
     from dqslam.io import Readings, ReadOptions
@@ -70,6 +77,8 @@ class ReadingOptions:
             help="Share of bad boxes or poses that are left out; with more, a file is refused.",
         ),
     ] = 0.05
+    since: FromTime = None
+    until: UntilTime = None
     poses: Annotated[
         list[str] | None,
         typer.Option(
@@ -152,6 +161,7 @@ class ReadingOptions:
             image_size=_size("--image-size", self.image_size, int),
             camera_id=self.camera_id,
             readings=self._readings(),
+            span=given_span(self.since, self.until),
         )
 
     def _readings(self) -> Readings:

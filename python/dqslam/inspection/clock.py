@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dqslam.calibration import scale_and_offset
 from dqslam.inspection.clock_costs import TimeCosts, step_costs, window_costs
 from dqslam.inspection.evidence import Evidence, Finding, Floats, NotEnoughDataError
 from dqslam.inspection.windows import MOST_WINDOWS
@@ -123,11 +124,14 @@ def check_clock(evidence: Evidence) -> Finding | None:
 
 def _judge(evidence: Evidence, clock: ClockOffset) -> Finding | None:
     if clock.drifts:
-        scale = 1 + clock.drift
+        scale, offset = scale_and_offset(
+            clock.drift, clock.seconds, float(np.median(evidence.table.timestamp))
+        )
         return Finding(
             "clock",
             f"the clocks drift apart by {1e3 * clock.drift:.3g} ± {1e3 * clock.drift_sigma:.2g} ms "
-            f"a second: --time-scale {scale:.5g}, or another rate of frames",
+            f"a second: --time-scale {scale:g} --time-offset {offset:.3f}, or another rate of "
+            "frames",
         )
     if not clock.sure:
         return None

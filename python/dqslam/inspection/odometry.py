@@ -12,6 +12,7 @@ from dqslam.inspection.pose_checks import NOISY
 from dqslam.inspection.tracks import doubles
 from dqslam.inspection.windows import LENGTHS
 from dqslam.io import Trajectory
+from dqslam.io.span import seconds as seconds_of
 
 # Lengths have another unit if half of the objects are larger or smaller [m], or if the camera is
 # faster half of the time than cars and drones are [m/s].
@@ -109,8 +110,8 @@ def note_jumps(evidence: Evidence) -> list[str]:
             row = int(rows[np.argmax(steps[rows])])
             notes.append(
                 f"the odometry {what} {rows.size} time{'s' if rows.size > 1 else ''}: at "
-                f"{times[row]:.6g} s it moves by {steps[row]:.3g} m in {seconds[row]:.3g} s, "
-                f"usually by {odd.usual:.2g} m at most. If it was lost there, "
-                "--odometry-covariance says how uncertain that step is"
+                f"{seconds_of(times[row])} s it moves by {steps[row]:.3g} m in "
+                f"{seconds[row]:.3g} s, usually by {odd.usual:.2g} m at most. If it was lost "
+                "there, --odometry-covariance says how uncertain that step is"
             )
     return notes

@@ -53,6 +53,7 @@ from dqslam.io.sources import FormatNames as FormatNames
 from dqslam.io.sources import choose_frame_times as choose_frame_times
 from dqslam.io.sources import kind_of as kind_of
 from dqslam.io.sources import split_formats as split_formats
+from dqslam.io.span import TimeSpan as TimeSpan
 from dqslam.io.step_covariances import read_step_covariances as read_step_covariances
 from dqslam.io.trajectory import TRAJECTORY_FORMATS as TRAJECTORY_FORMATS
 from dqslam.io.trajectory import Trajectory as Trajectory

@@ -243,7 +243,8 @@ def _convert(
     if timeless and not target.needs_times:
         reading = replace(reading, frames=BY_NUMBER)
     if kind == "trajectory":
-        trajectory = read_path_file(source, reading, context.notes, progress=progress)
+        whole = read_path_file(source, reading, context.notes, progress=progress)
+        trajectory = reading.span.of_path(whole, source)
         return _write_trajectory(out, trajectory, target, times=not timeless)
     table = read_boxes_file(
         source,
@@ -254,6 +255,7 @@ def _convert(
         cut=False,
         progress=progress,
     )
+    table = reading.span.of_boxes(table)
     return _write_detections(out, table, target, context, times=not timeless)
 
 

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
+from typing import Any, TypeVar
 
-from dqslam._checks import Ints
+import numpy as np
+
+from dqslam._checks import Floats
 from dqslam.io.formats import guarded
 from dqslam.io.measurements import read_absolute, read_closures, read_positions
-from dqslam.recording import Recording
+from dqslam.recording import AbsolutePositions, LoopClosures, Recording, RelativePositions
+
+Measured = TypeVar("Measured", RelativePositions, AbsolutePositions, LoopClosures)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,14 +28,18 @@ class Extras:
     """Relative poses of the camera between any two poses."""
 
     def added_to(
-        self, recording: Recording, max_time_difference: float | None, counted: Ints | None = None
+        self, recording: Recording, max_time_difference: float, pose_times: Floats
     ) -> Recording:
         """Return a recording with the measurements of the files.
 
-        ``max_time_difference`` is the most seconds from a measurement to its pose, and ``counted``
-        (k,) are the rows of the poses that the files count, by default all.
+        ``max_time_difference`` is the most seconds from a measurement to its pose. ``pose_times``
+        (k,) are those of the whole trajectory, whose poses the files count. Measurements of poses
+        that are before or after the recording are left out.
         """
-        near = (recording.timestamps, max_time_difference, counted)
+        times = recording.timestamps
+        before = pose_times[pose_times < times[0]]
+        every = np.concatenate([before, times, pose_times[pose_times > times[-1]]])
+        near = (every, max_time_difference, np.searchsorted(every, pose_times))
         for name, path, read in (
             ("positions", self.positions, read_positions),
             ("absolute", self.absolute, read_absolute),
@@ -38,5 +47,18 @@ class Extras:
         ):
             if path is not None:
                 measured = guarded(path, f"CSV of {name}", read, path, *near)
-                recording = replace(recording, **{name: measured})
+                changes: dict[str, Any] = {name: _of_part(measured, len(before), len(times))}
+                recording = replace(recording, **changes)
         return recording
+
+
+def _of_part(measured: Measured, first: int, count: int) -> Measured | None:
+    """Return the measurements of so many poses from a first one on, whose row is then 0."""
+    names = [field.name for field in fields(measured)]
+    columns = {name: getattr(measured, name) for name in names}
+    poses = [name for name in names if name.endswith("pose")]
+    inside = np.all([(columns[n] >= first) & (columns[n] < first + count) for n in poses], axis=0)
+    if not inside.any():
+        return None
+    kept = {name: column[inside] for name, column in columns.items()}
+    return replace(measured, **kept | {name: kept[name] - first for name in poses})

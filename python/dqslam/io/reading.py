@@ -18,6 +18,7 @@ from dqslam.io.frames import FrameTimes
 from dqslam.io.notes import MAX_BAD, Notes
 from dqslam.io.readings import AS_USUAL, Readings
 from dqslam.io.sources import FormatNames, choose_frame_times, format_of, topic_of
+from dqslam.io.span import ALL_TIME, TimeSpan
 from dqslam.io.trajectory import Trajectory, read_trajectory
 from dqslam.io.trajectory.rosbag import KINDS as TRAJECTORIES
 
@@ -48,6 +49,8 @@ class ReadOptions:
     """Most seconds from a box to the nearest pose; None is half the median interval of poses."""
     readings: Readings = AS_USUAL
     """What numbers in the files mean, where it is not what is usual."""
+    span: TimeSpan = ALL_TIME
+    """The part of the recording that is used: poses and boxes of other times are left out."""
 
     def __post_init__(self) -> None:
         """Check the numbers."""
@@ -83,7 +86,7 @@ def read_camera_file(path: str | Path, options: ReadOptions) -> _core.Camera:
 def read_path_file(
     path: str | Path, options: ReadOptions, notes: Notes, *, progress: Progress = no_progress
 ) -> Trajectory:
-    """Read the trajectory of the camera of a recording, in meters."""
+    """Read the whole trajectory of the camera of a recording, in meters."""
     trajectory = read_trajectory(
         path,
         format_of(path, "trajectory", options.formats).name,
@@ -112,7 +115,8 @@ def read_boxes_file(
     """Read the boxes of a recording, for an image of this width and height in px.
 
     They are read as they are meant before they are checked and cut. Their frames may be those of a
-    trajectory. ``classes``, ``cut``, ``check`` and ``min_score`` are those of ``read_detections``.
+    trajectory, the whole one. Boxes of the whole time are returned. ``classes``, ``cut``, ``check``
+    and ``min_score`` are those of ``read_detections``.
     """
     readings = options.readings
     if size is None and readings.boxes.image is not None:

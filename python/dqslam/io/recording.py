@@ -141,15 +141,17 @@ def load_recording(
     own = Notes(max_bad=how.max_bad) if notes is None else notes
     check_topics(camera, odometry, detections, how)
     lens = read_camera_file(camera, how)
-    trajectory = read_path_file(odometry, how, own)
+    whole = read_path_file(odometry, how, own)
+    trajectory = how.span.of_path(whole, odometry)
     pose_times, path = trajectory
     if len(pose_times) < 2:
         raise FileError(odometry, "one pose only: nothing moves")
     size = (lens.width, lens.height)
     # Uncut, because boxes that leave the image tell that they are of another one.
     table = read_boxes_file(
-        detections, size, how, own, trajectory=trajectory, cut=False, min_score=min_score
+        detections, size, how, own, trajectory=whole, cut=False, min_score=min_score
     )
+    table = how.span.of_boxes(table)
     if examine is not None:
         taking_part = table.score >= min_score
         examine(lens, trajectory, table.select(taking_part) if taking_part.any() else table)
@@ -159,7 +161,9 @@ def load_recording(
     object_id = object_ids(table, ids)
     covariance = (odometry_noise or OdometryNoise()).covariance(len(path) - 1)
     if odometry_covariance is not None:
-        covariance = read_step_covariances(odometry_covariance, pose_times)
+        every = read_step_covariances(odometry_covariance, whole.timestamps)
+        first = int(np.searchsorted(whole.timestamps, pose_times[0]))
+        covariance = every[first : first + len(path) - 1]
     steps, times = Odometry.from_poses(path, covariance=covariance), pose_times
     _, late = nearest_pose(times, table.timestamp)
     half = 0.5 * float(np.median(np.diff(times)))
@@ -194,8 +198,7 @@ def load_recording(
             class_names={number: name or str(number) for number, name in classes.items()},
         ),
     )
-    in_file = np.searchsorted(times, pose_times)
-    return (extras or Extras()).added_to(recording, tolerance, in_file), dropped
+    return (extras or Extras()).added_to(recording, tolerance, whole.timestamps), dropped
 
 
 def _scored(table: DetectionTable, box: NDArray[np.float64], min_score: float) -> NDArray[np.bool_]:

@@ -11,7 +11,7 @@ from dqslam import _core
 from dqslam._checks import Bools, Floats, Ints
 from dqslam.association import CHI2_GATE, FINAL, RepeatedNoise
 from dqslam.assumptions import BoxNoise, OdometryNoise, SizePrior, SizePriors
-from dqslam.calibration import CalibrationFinding
+from dqslam.calibration import CalibrationFinding, ClockError
 from dqslam.estimate import Estimate
 from dqslam.evaluation import trajectory_error
 from dqslam.graph import Graph
@@ -26,6 +26,7 @@ from dqslam.pipeline.report import (
     describe_box_noise,
     describe_boxes,
     describe_calibration,
+    describe_clock,
     describe_objects,
     describe_size_prior,
     describe_solver,
@@ -42,6 +43,10 @@ from dqslam.pipeline.shape_choice import warn_of_shapes
 from dqslam.recording import Detections
 from dqslam.tracks import Tracked
 from dqslam.uncertainty import Marginals
+
+CLOCK = "clock:"  #: how a doubt about clocks begins
+# The score of a delay tells less than a search has found, and says another number.
+DELAY = "time_offset"
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +85,8 @@ class EstimatorOutput:
     """What was noticed on the way, a sentence each."""
     calibration: tuple[CalibrationFinding, ...] = ()
     """What the boxes say about camera, mount and odometry, which were taken for known."""
+    clock: ClockError | None = None
+    """The offset of time with which the map fits the boxes best; None if it was not looked for."""
     hidden: Bools | None = None
     """Edges of each box that a nearer object may hide, shape (m, 4); None where not looked for."""
     estimated: tuple[CalibrationFinding, ...] = ()
@@ -157,6 +164,9 @@ def conclude(
     if tests_held_out:
         object_id[held_out] = tested_id
     doubts = warn_of_boxes(len(output.object_id), int(mapped.sum()))
+    clock_is_wrong = output.clock is not None and output.clock.is_sure
+    if output.clock is not None and clock_is_wrong:
+        doubts.append(f"{CLOCK} {output.clock}")
     report = {
         "warnings": [
             *output.remarks,
@@ -167,7 +177,9 @@ def conclude(
             *warn_of_shapes(output.shapes),
             *warn_of_placements(output.placements),
             *warn_of_bent_poses(output.marginals),
-            *warn_of_calibration(output.calibration),
+            *warn_of_calibration(
+                one for one in output.calibration if not (clock_is_wrong and one.name == DELAY)
+            ),
         ],
         "doubts": doubts,
         "mode": options.mode.name.lower(),
@@ -191,6 +203,7 @@ def conclude(
         if noise is None
         else {"from": "estimated"} | asdict(noise) | {"levels": output.noise_levels},
         "calibration": [asdict(finding) for finding in output.calibration],
+        "clock": None if output.clock is None else describe_clock(output.clock),
         "estimated_calibration": describe_calibration(output.estimated),
         "under_constrained": [str(part) for part in output.marginals.under_constrained]
         if output.marginals

@@ -18,7 +18,7 @@ from dqslam.association import FINAL
 from dqslam.inspection import FATAL, find_jumps, first_findings
 from dqslam.io.results import GRAPH_FILE, write_graph
 from dqslam.io.results.save import write_estimate
-from dqslam.pipeline.conclude import RunResult
+from dqslam.pipeline.conclude import CLOCK, RunResult
 from dqslam.pipeline.jumps import doubt_jumps
 from dqslam.pipeline.options import Progress, RunFilesOptions
 from dqslam.pipeline.problem import kept_options
@@ -138,6 +138,9 @@ def _run(
         progress=progress,
     )
     estimate = result.estimate
+    if any(told.startswith(CLOCK) for told in result.report["doubts"]):
+        # A finished map tells clocks better than the first check.
+        doubts = [told for told in doubts if not told.startswith(CLOCK)]
     doubts += doubt_jumps(landmarks_of(estimate), result.detections, estimate.timestamps, jumps)
     report = {
         "camera": str(camera),

@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from dqslam._checks import Bools, Floats, Ints
+from dqslam.io.span import seconds
 from dqslam.metrics import match_boxes
 from dqslam.places import CannotTellError, Landmarks, align
 from dqslam.recording import Detections
@@ -19,9 +20,6 @@ from dqslam.recording import Detections
 GAP = 3.0  #: median intervals of poses, beyond which boxes that overlap may be of other things
 SAME_IOU = 0.5  #: intersection over union of boxes that show the same thing in successive images
 FEWEST_PARTED = 2
-REMEDY = (
-    "Estimate the parts of the recording alone (--force), and join their maps by `dqslam merge`"
-)
 
 
 def doubt_jumps(
@@ -67,8 +65,9 @@ def _doubt_parted(boxes: Detections, timestamps: Floats, jump: float) -> str | N
     if parted < FEWEST_PARTED or parted <= alike.sum() / 2:
         return None
     return (
-        f"the odometry jumps at {jump:.6g} s, and {parted} of {alike.sum()} boxes that hardly move "
-        f"in the images then are of another object afterwards: the map has objects twice. {REMEDY}"
+        f"the odometry jumps at {seconds(jump)} s, and {parted} of {alike.sum()} boxes that hardly "
+        "move in the images then are of another object afterwards: the map has objects twice. "
+        f"{_remedy(jump, first)}"
     )
 
 
@@ -104,12 +103,25 @@ def doubt_torn(landmarks: Landmarks, times: Floats, object_id: Ints, jumps: Floa
             continue
         centers = landmarks.centers[np.isin(landmarks.object_ids, found.a_ids)]
         there = centers @ found.b_from_a[:3, :3].T + found.b_from_a[:3, 3]
+        x, y, z = found.b_from_a[:3, 3].tolist()
+        trace = float(np.trace(found.b_from_a[:3, :3]))
+        turn = float(np.degrees(np.arccos(np.clip((trace - 1.0) / 2.0, -1.0, 1.0))))
         moved = float(np.linalg.norm(there - centers, axis=1).mean())
         doubts.append(
-            f"the odometry jumps at {time:.6g} s, and {len(found)} objects are in the map twice, "
-            f"once from before it and once from after it, {moved:.3g} m away. {REMEDY}"
+            f"the odometry jumps at {seconds(time)} s, and {len(found)} objects are in the map "
+            f"twice, once from before it and once from after it, {moved:.3g} m away: all that "
+            f"comes later is turned by {turn:.3g} deg and moved by {x:.3g} {y:.3g} {z:.3g} m. "
+            f"{_remedy(time, float(times[times > time].min()))}"
         )
     return doubts
+
+
+def _remedy(last: float, first: float) -> str:
+    """Say how the parts are estimated alone, from the times of their last and first images."""
+    return (
+        f"Estimate the parts alone, with --until {seconds(last)} and with --from {seconds(first)}, "
+        "and join their maps by `dqslam merge`"
+    )
 
 
 def _chosen(landmarks: Landmarks, rows: Bools) -> Landmarks:

@@ -89,6 +89,13 @@ def kept_problem(output: EstimatorOutput, recording: Recording, mode: _core.Mode
     return _with_repeated_errors(graph, state, output.repeated, output)
 
 
+def state_of(output: EstimatorOutput, graph: Graph) -> _core.State:
+    """Return the poses and objects of an estimate as a state of its kept problem."""
+    estimate = output.estimate
+    rows = np.searchsorted(estimate.object_ids, graph.object_ids)
+    return _core.State(estimate.poses, estimate.ellipsoids[rows], shared=estimate.shared)
+
+
 def _with_repeated_errors(
     graph: Graph, state: _core.State, noise: RepeatedNoise, output: EstimatorOutput
 ) -> Graph:

@@ -9,12 +9,14 @@ import numpy as np
 from dqslam import _core
 from dqslam.association import FINAL, UNSURE
 from dqslam.assumptions import SizePriors
+from dqslam.calibration import find_clock_error
 from dqslam.evaluation import common_poses
 from dqslam.io import Trajectory
 from dqslam.lens import camera_with, lens_of
 from dqslam.pipeline.batch import estimate_batch
 from dqslam.pipeline.border import with_cut_edges
 from dqslam.pipeline.calibrated import check_estimated, estimate_calibrated
+from dqslam.pipeline.clock import with_clock
 from dqslam.pipeline.conclude import RunResult, conclude
 from dqslam.pipeline.hold_out import choose_held_out
 from dqslam.pipeline.lens import widened
@@ -23,7 +25,7 @@ from dqslam.pipeline.moving import with_tracks
 from dqslam.pipeline.online import estimate_online
 from dqslam.pipeline.options import Progress, RunOptions
 from dqslam.pipeline.placements import with_placements
-from dqslam.pipeline.problem import kept_problem
+from dqslam.pipeline.problem import kept_problem, state_of
 from dqslam.pipeline.shapes import with_shapes
 from dqslam.recording import Recording
 
@@ -44,7 +46,9 @@ def run(
     Positions of objects, absolute positions and loop closures take part in a last estimate of all
     poses and objects, whose boxes are known by then. With absolute positions, the result is in
     their frame. Positions need final ids; measurements of other kinds take no part.
-    With ``options.estimate``, camera, mount, clock or odometry are estimated with all else.
+    With ``options.estimate``, camera, mount, clock or odometry are estimated with all else. The
+    clock is looked for far from the times of the boxes first, and boxes without a pose at their
+    time are left out then.
 
     Parameters
     ----------
@@ -93,11 +97,13 @@ def run(
     if options.trust_ids < FINAL or np.all(boxes.object_id < 0):
         options = replace(options, trust_ids=min(options.trust_ids, UNSURE))
     recording, remarks = usable_measurements(recording, options)
+    estimator = estimate_online if online else estimate_batch
+    recording, options, clock = with_clock(recording, options, estimator, progress)
+    boxes = recording.detections
     if not len(boxes):
         remarks = ("there is no box: the trajectory is the odometry", *remarks)
     held_out = choose_held_out(len(boxes), options.hold_out, seed=options.seed)
     known = replace(recording, detections=boxes.select(~held_out))
-    estimator = estimate_online if online else estimate_batch
     if options.estimate:
         output, calibrated = estimate_calibrated(known, options, estimator, progress)
         mount = calibrated.camera.robot_from_camera
@@ -110,15 +116,18 @@ def run(
         bare = replace(known, positions=None, measurements=(), absolute=None, closures=None)
         calibrated = known
         output = with_measurements(estimator(bare, options, progress), known, options)
+    output = clock.added_to(output)
     output = with_placements(with_shapes(output, calibrated, options), calibrated, options)
     output = with_tracks(output, replace(calibrated, detections=known.detections), options)
     output = replace(output, remarks=(*output.remarks, *remarks))
+    graph = kept_problem(output, calibrated, options.mode)
+    if graph is not None:
+        output = replace(output, clock=find_clock_error(graph, state_of(output, graph)))
     # Boxes are judged as the calibration corrects them, and returned as they were given.
     shift = np.zeros((len(boxes), 4))
     shift[~held_out] = calibrated.detections.box - known.detections.box
     corrected = replace(boxes, box=boxes.box + shift)
     result = conclude(output, corrected, held_out, options, reference)
-    graph = kept_problem(output, calibrated, options.mode)
     shown = result.detections
     return replace(
         result,

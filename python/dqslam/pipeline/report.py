@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from dqslam import _core
 from dqslam.association import CHI2_GATE, FinalEstimate, RepeatedNoise
 from dqslam.assumptions import BoxNoise, SizePrior, SizePriors
-from dqslam.calibration import CalibrationFinding
+from dqslam.calibration import CalibrationFinding, ClockError
 from dqslam.estimate import Estimate
 from dqslam.recording import Detections
 from dqslam.solids import box_chi_squares
@@ -100,9 +100,20 @@ def warn_of_bent_poses(marginals: Marginals | None) -> list[str]:
     ]
 
 
-def warn_of_calibration(findings: tuple[CalibrationFinding, ...]) -> list[str]:
+def warn_of_calibration(findings: Iterable[CalibrationFinding]) -> list[str]:
     """Warn of deviations from the calibration that even repeated errors of boxes do not explain."""
     return [str(finding) for finding in findings if finding.sigmas > SURE_OF_CALIBRATION]
+
+
+def describe_clock(clock: ClockError) -> dict[str, Any]:
+    """Describe the offset of time with which the map fits the boxes best."""
+    return {
+        "seconds": clock.seconds,
+        "sigma_s": clock.sigma,
+        "gain": clock.gain,
+        "rate": clock.rate,
+        "sure": clock.is_sure,
+    }
 
 
 def describe_calibration(estimated: tuple[CalibrationFinding, ...]) -> dict[str, Any]:

@@ -122,6 +122,7 @@ def _read_images(
         nms=how.nms,
         notes=notes,
     )
+    table = how.span.of_boxes(table)
     box = undistorted_or_nan(lens, table.box) if lens.has_distortion else table.box
     keep = (table.score >= min_score) & np.isfinite(box).all(axis=1)
     if not keep.any():
