@@ -64,7 +64,6 @@ class Scene:
             self.ground.sigmas(depth),
             size,
             motion_noise(class_name),
-            self.ground.kind == "below the camera",
         )
 
     def class_name(self, rows: Ints) -> str:

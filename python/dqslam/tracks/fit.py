@@ -169,13 +169,36 @@ def evidence_with_path(problem: TrackProblem, fit: TrackFit, moves: Bools, path:
     eliminated, to (1 + P M)^-1 P (M c - g). The motions cost c^T P^-1 c / 2 there, and their volume
     log |1 + P M| / 2.
     """
-    size = 6 * len(fit.equations.diagonal)
-    at, motion, force = fit, np.zeros(size), np.zeros(size)  # the motion is P times the force
-    cost = fit.equations.cost
+    found = [_move_path(problem, fit, moves, path, np.zeros(6 * len(problem.box)))]
+    # A box that fits nowhere near pulls too little to bring the path to where it does.
+    coarse = replace(problem, variance=problem.variance * LESS_SURE[-1] ** 2)
+    near = fit_track(coarse, fit.trajectory, moves, max_iterations=COARSE_ITERATIONS)
+    if near is not None:
+        near, force, _ = _move_path(coarse, near, moves, path, np.zeros(6 * len(problem.box)))
+        there = problem.moved((path @ force).reshape(-1, 6))
+        at = fit_track(there, near.trajectory, moves)
+        if at is not None:
+            found.append(_move_path(problem, at, moves, path, force))
+    at, force, cost = min(found, key=lambda one: one[2])
+    both = np.eye(len(force)) + path @ _information_of_cameras(at)
+    volume = float(np.linalg.slogdet(both)[1])
+    return at.log_evidence + at.equations.cost - cost - 0.5 * volume
+
+
+def _move_path(
+    problem: TrackProblem, fit: TrackFit, moves: Bools, path: Floats, force: Floats
+) -> tuple[TrackFit, Floats, float]:
+    """Move the cameras by the path's covariance times forces (6 n,), to where the cost is lowest.
+
+    ``fit`` is that of the cameras moved by the given forces. Return the last one, its forces, and
+    the cost with that of the motions.
+    """
+    at, motion = fit, path @ force
+    cost = fit.equations.cost + 0.5 * float(motion @ force)
     for _ in range(_PATH_ROUNDS):
         information = _information_of_cameras(at)
         pull = information @ motion - at.equations.gradient_camera.ravel()
-        both = np.eye(size) + path @ information
+        both = np.eye(len(force)) + path @ information
         step = np.linalg.solve(both, path @ pull) - motion
         change = pull - information @ (motion + step) - force
         for share in _SHARES_OF_STEP:
@@ -190,9 +213,7 @@ def evidence_with_path(problem: TrackProblem, fit: TrackFit, moves: Bools, path:
         gain, at, motion, force, cost = cost - total, after, moved, forced, total
         if gain < _PATH_TOLERANCE:
             break
-    both = np.eye(size) + path @ _information_of_cameras(at)
-    volume = float(np.linalg.slogdet(both)[1])
-    return at.log_evidence - 0.5 * float(motion @ force) - 0.5 * volume
+    return at, force, cost
 
 
 def _information_of_cameras(fit: TrackFit) -> Floats:

@@ -48,8 +48,6 @@ class TrackProblem:
     """Sigma of the height of the foot above it, meters, shape (n,)."""
     size: BodySize
     noise: MotionNoise
-    ground_follows: bool = False
-    """Whether the ground is known in the frame of the camera, and goes where that goes."""
 
     def select(self, rows: Bools) -> TrackProblem:
         """Return the problem of some of the boxes, by a flag for each (n,)."""
@@ -65,26 +63,16 @@ class TrackProblem:
         )
 
     def moved(self, motion: Floats) -> TrackProblem:
-        """Return the problem with its cameras moved, each in its own frame [m, rad], (n, 6)."""
+        """Return the problem with its cameras moved, each in its own frame [m, rad], (n, 6).
+
+        The ground stays.
+        """
         from scipy.spatial.transform import Rotation
 
         views = self.views
         turned = views.rotation @ Rotation.from_rotvec(motion[:, 3:]).as_matrix()
         position = views.position + np.einsum("nij,nj->ni", views.rotation, motion[:, :3])
-        plane = self.plane
-        if self.ground_follows:
-            turn = turned @ views.rotation.transpose(0, 2, 1)
-            below = views.position.copy()
-            below[:, 2] = plane[:, 0] + np.sum(plane[:, 1:] * below[:, :2], axis=1)
-            below = position + np.einsum("nij,nj->ni", turn, below - views.position)
-            normal = np.einsum("nij,nj->ni", turn, self.normals())
-            slope = -normal[:, :2] / normal[:, 2:]
-            plane = np.column_stack([below[:, 2] - np.sum(slope * below[:, :2], axis=1), slope])
-        return replace(self, views=replace(views, rotation=turned, position=position), plane=plane)
-
-    def normals(self) -> Floats:
-        """Return normals of the ground of each image, 1 along the vertical, (n, 3)."""
-        return np.column_stack([-self.plane[:, 1:], np.ones(len(self.plane))])
+        return replace(self, views=replace(views, rotation=turned, position=position))
 
     def feet(self, state: Floats) -> Floats:
         """Return the feet [m] of states (n, 6), shape (n, 3)."""
@@ -151,8 +139,7 @@ def linearize(
     """
     state, count = at.state, len(at.state)
     half = np.exp(at.log_half)
-    feet = problem.feet(state)
-    seen = predict_boxes(problem.views, feet, state[:, HEADING], half)
+    seen = predict_boxes(problem.views, problem.feet(state), state[:, HEADING], half)
     if not (seen.is_whole | (seen.in_front & problem.truncated.any(axis=1))).all():
         return None
     sigma = np.sqrt(problem.variance)
@@ -167,10 +154,7 @@ def linearize(
     by_state[..., :ABOVE] = seen.by_place[..., :2] + seen.by_place[..., 2:3] * slope
     by_state[..., ABOVE] = seen.by_place[..., 2] * problem.above[:, None]
     by_state[..., HEADING] = seen.by_place[..., 3]
-    of_camera = seen.by_camera
-    if problem.ground_follows:
-        of_camera = of_camera + seen.by_place[..., 2:3] * _rise_by_camera(problem, feet)[:, None]
-    by_state, by_size, by_camera = scale * by_state, scale * seen.by_size, scale * of_camera
+    by_state, by_size, by_camera = scale * by_state, scale * seen.by_size, scale * seen.by_camera
     transposed = by_state.transpose(0, 2, 1)
     diagonal = transposed @ by_state
     of_boxes = np.diagonal(diagonal, axis1=1, axis2=2).copy()
@@ -178,7 +162,8 @@ def linearize(
     cost = 0.5 * information * (FREEDOM + 4.0) * float(np.log1p(chi2 / FREEDOM).sum())
 
     drift = min(FORGOTTEN_AFTER_S**-0.5, MOST_DRIFT / float(np.median(problem.above)))
-    steps = compare_steps(state, np.diff(problem.seconds), moves, problem.noise, drift)
+    seconds, plane, above = np.diff(problem.seconds), problem.plane, problem.above
+    steps = compare_steps(state, seconds, moves, problem.noise, drift, plane, above)
     back, on = steps.by_from.transpose(0, 2, 1), steps.by_to.transpose(0, 2, 1)
     diagonal[:-1] += back @ steps.by_from
     diagonal[1:] += on @ steps.by_to
@@ -212,17 +197,6 @@ def linearize(
         + 0.5 * float(np.linalg.slogdet(precision)[1]),
         chi2,
     )
-
-
-def _rise_by_camera(problem: TrackProblem, feet: Floats) -> Floats:
-    """Return how the ground at feet (n, 3) rises with a motion of a camera that it follows, (n, 6).
-
-    The motion is in the camera's own frame [m, rad].
-    """
-    normal, turn = problem.normals(), problem.views.rotation
-    shift = np.einsum("ni,nij->nj", normal, turn)
-    lever = np.cross(feet - problem.views.position, normal)
-    return np.concatenate([shift, np.einsum("ni,nij->nj", lever, turn)], axis=1)
 
 
 def _only_bounds(problem: TrackProblem, seen: PredictedBoxes) -> Bools:

@@ -16,20 +16,20 @@ own frame; None where it is unknown."""
 
 
 def reckoned_covariance(odometry: Odometry, poses: Floats, images: Ints) -> Floats:
-    """Return the joint covariance (k n, k n) of dead-reckoned poses relative to the first of them.
+    """Return the joint covariance (k n, k n) of dead-reckoned poses, of which the first is exact.
 
     It is of small motions of the poses (m, d) at ``images`` (n,), ascending, each in its own frame,
-    by the noise of the steps between them.
+    by the noise of the steps that lead to them.
     """
     model = odometry.pose_model
-    steps = np.arange(images[0], images[-1])
+    steps = np.arange(images[-1])
     # A small motion of a pose, in the frame of the next one.
     onward = _core.adjoint(model, _core.between(model, poses[steps + 1], poses[steps]))
     size = odometry.covariance.shape[1]
     spread = np.zeros((len(steps) + 1, size, size))
     for row, step in enumerate(steps.tolist()):
         spread[row + 1] = onward[row] @ spread[row] @ onward[row].T + odometry.covariance[step]
-    spread = spread[images - images[0]]
+    spread = spread[images]
     # What moves an image moves those after it along, too.
     before, after = np.tril_indices(len(images))[::-1]
     along = _core.adjoint(model, _core.between(model, poses[images[after]], poses[images[before]]))
