@@ -77,6 +77,40 @@ def test_the_gradient_is_that_of_the_cost():
         assert found[place] == pytest.approx((costs[0] - costs[1]) / (2 * e), rel=1e-4, abs=1e-3)
 
 
+@pytest.mark.parametrize("moves", [MOVES, ~MOVES])
+def test_derivatives_by_cameras_that_the_ground_follows_are_small_differences(moves):
+    problem, truth = oncoming(noise_px=1.0)
+    plane = np.tile([0.1, 0.02, -0.03], (COUNT, 1))
+    problem = replace(problem, plane=plane, ground_follows=True)
+    random, e = np.random.default_rng(3), 1e-6
+    at = moved(truth, 0.02 * random.normal(size=6 * COUNT + 3))
+    first = truth.state[0]
+    equations = linearize(problem, at, moves, first)
+    for place in range(0, 6 * COUNT, 5):
+        step = (e * np.eye(6 * COUNT)[place]).reshape(-1, 6)
+        costs = [linearize(problem.moved(s * step), at, moves, first).cost for s in (1, -1)]
+        expected = (costs[0] - costs[1]) / (2 * e)
+        found = equations.gradient_camera.ravel()[place]
+        assert found == pytest.approx(expected, rel=1e-3, abs=0.05)
+
+
+def test_a_world_that_turns_as_a_whole_turns_tracks_and_leaves_speeds():
+    """All cameras turn about the origin by 1 mrad, the ground with them: so does the thing."""
+    problem, truth = oncoming()
+    views, turn = problem.views, np.array([0.0, 1e-3, 0.0])
+    axes = views.rotation.transpose(0, 2, 1)
+    shift = np.einsum("nij,nj->ni", axes, np.cross(turn, views.position))
+    motion = np.concatenate([shift, axes @ turn], axis=1).ravel()
+    change = {}
+    for follows in (True, False):
+        fit = fit_track(replace(problem, ground_follows=follows), truth, MOVES)
+        change[follows] = (covariance(fit)[1] @ motion)[:-3].reshape(-1, 6)
+    # It stays upright, which is what is left.
+    assert np.abs(change[True][:, SPEED]).max() < 0.005
+    assert np.abs(change[True][:, :2]).max() < 0.06
+    assert np.abs(change[False][:, SPEED]).max() > 0.02
+
+
 def dense(equations):
     """The normal equations as one matrix."""
     full = np.zeros((6 * COUNT + 3, 6 * COUNT + 3))

@@ -66,6 +66,7 @@ class Scene:
             self.ground.sigmas(depth[:, None] * np.column_stack([*ray, np.ones(len(box))])),
             size,
             motion_noise(class_name),
+            self.ground.kind == "below the camera",
         )
 
     def class_name(self, rows: Ints) -> str:

@@ -225,6 +225,9 @@ def _information_of_cameras(fit: TrackFit) -> Floats:
     for row, own in enumerate(fit.equations.of_camera):
         place = slice(6 * row, 6 * row + 6)
         information[place, place] += own
+    for row, own in enumerate(fit.equations.rest_by_camera):
+        place = slice(6 * row, 6 * row + 12)
+        information[place, place] += np.outer(own, own)
     return np.asarray(information)
 
 
@@ -251,4 +254,8 @@ def _coupling(equations: Equations) -> Floats:
         columns = slice(6 * row, 6 * row + 6)
         coupling[SIZE * row : SIZE * row + SIZE, columns] = equations.by_camera[row, :SIZE]
         coupling[-3:, columns] = equations.by_camera[row, SIZE:]
+    steps = zip(equations.rest_by_state, equations.rest_by_camera, strict=True)
+    for row, (by_state, by_camera) in enumerate(steps):
+        place = slice(6 * row, 6 * row + 12)
+        coupling[place, place] += np.outer(by_state, by_camera)
     return coupling

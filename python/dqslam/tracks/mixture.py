@@ -8,7 +8,7 @@ import numpy as np
 
 from dqslam._checks import Floats
 from dqslam.tracks.fit import TrackFit, covariance, with_information
-from dqslam.tracks.motion import HEADING, SIZE, SPEED
+from dqslam.tracks.motion import ABOVE, HEADING, SIZE, SPEED
 from dqslam.tracks.problem import TrackProblem
 from dqslam.tracks.switches import Explanation
 
@@ -58,6 +58,10 @@ def mixed(
         spreads.append(whole[places[:, :, None], places[:, None, :]])
         if row == 0 and path is not None:
             rows = by_camera[places]
+            # A foot at the same height above a ground that follows the camera rises with it.
+            rise = problem.rise(problem.feet(fit.trajectory.state)) / problem.above[:, None]
+            for image, own in enumerate(rise):
+                rows[image, ABOVE, 6 * image : 6 * image + 6] += own
             of_path = (rows @ path) @ rows.transpose(0, 2, 1)
     state = np.einsum("w,wni->ni", weights, states)
     log_half = weights @ np.array(sizes)
