@@ -79,7 +79,7 @@ class Ground:
         """
         place = np.column_stack([toward, np.ones(len(toward))])
         common = np.einsum("ni,ij,nj->n", place, self.tilt, place)
-        return np.sqrt(self._own(np.linalg.norm(toward, axis=1)) ** 2 + common)
+        return np.asarray(np.sqrt(self._own(np.linalg.norm(toward, axis=1)) ** 2 + common))
 
     def corrected(self, above: Floats, variance: Floats, distance: Floats) -> Ground:
         """Return the ground as corrected by heights [m] at which things stand above it, (t,).

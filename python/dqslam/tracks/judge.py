@@ -35,6 +35,8 @@ from dqslam.tracks.switches import Explanation, explain_with_rests
 PRIOR: dict[Behavior, float] = {"rests": 0.6, "moves": 0.3, "stops and goes": 0.1}
 # A thing moves if it rests with at most this probability.
 MOST_PROBABLY_RESTS = 0.01
+# Whether it rests in part is not asked if rest is likelier than motion by so much, a logarithm.
+SURELY_RESTS = 4.0
 # Of a thing at rest, so many boxes tell which start is near.
 _FEW = 10
 
@@ -74,35 +76,34 @@ def judge(problem: TrackProblem, path: Floats | None = None) -> Judgment | None:
     places, weight = rough_places(problem)
     all_along, never = np.ones(count - 1, dtype=np.bool_), np.zeros(count - 1, dtype=np.bool_)
     found: dict[Behavior, list[Explanation]] = {}
+    log_odds: dict[Behavior, Floats] = {}
+
+    def weigh(name: Behavior, ways: list[Explanation]) -> None:
+        # Explanations of one behavior are alike: what the path explains of one, it does of all.
+        first = ways[0].fit
+        gain = 0.0
+        if path is not None:
+            gain = evidence_with_path(problem, first, ways[0].moves, path) - first.log_evidence
+        found[name] = ways
+        prior = float(np.log(PRIOR[name]))
+        log_odds[name] = np.array([prior + gain + way.log_evidence for way in ways])
+
+    resting = _rest(problem, resting_starts(problem, places, weight))
+    if resting is not None:
+        weigh("rests", [Explanation(resting, never, resting.log_evidence)])
     moving = fit_from_afar(problem, moving_start(problem, places, weight), all_along)
     if moving is not None:
         other = fit_track(problem, mirrored_start(problem, moving.trajectory), all_along)
         if other is not None and other.log_evidence > moving.log_evidence:
             moving = other
-    resting = _rest(problem, resting_starts(problem, places, weight))
-    if resting is not None:
-        found["rests"] = [Explanation(resting, never, resting.log_evidence)]
-    if moving is not None:
-        found["moves"] = [Explanation(moving, all_along, moving.log_evidence)]
-        with_rests = explain_with_rests(problem, moving)
+        weigh("moves", [Explanation(moving, all_along, moving.log_evidence)])
+        # What moves in some of the images is likelier to move all along than to rest.
+        surely = resting is not None and log_odds["rests"][0] > log_odds["moves"][0] + SURELY_RESTS
+        with_rests = [] if surely else explain_with_rests(problem, moving)
         if with_rests:
-            found["stops and goes"] = with_rests
+            weigh("stops and goes", with_rests)
     if not found:
         return None
-    # Explanations of one behavior are alike: what the path explains of one, it does of all.
-    of_path = {
-        name: 0.0
-        if path is None
-        else evidence_with_path(problem, ways[0].fit, ways[0].moves, path)
-        - ways[0].fit.log_evidence
-        for name, ways in found.items()
-    }
-    log_odds = {
-        name: np.array(
-            [float(np.log(PRIOR[name])) + of_path[name] + way.log_evidence for way in ways]
-        )
-        for name, ways in found.items()
-    }
     most = max(float(odds.max()) for odds in log_odds.values())
     share = {name: np.exp(odds - most) for name, odds in log_odds.items()}
     total = float(sum(part.sum() for part in share.values()))
