@@ -10,8 +10,8 @@ import numpy as np
 from dqslam import _core
 from dqslam._checks import Floats, Ints
 from dqslam.association import FINAL, Association
-from dqslam.association.scene_map import SceneMap
-from dqslam.assumptions import SizePriors
+from dqslam.assumptions import BoxNoise, SizePriors
+from dqslam.estimate import Estimate
 from dqslam.io.results.covariances import motion_of_camera
 from dqslam.pipeline.conclude import EstimatorOutput
 from dqslam.pipeline.options import RunOptions
@@ -32,7 +32,9 @@ def without_movers(found: Association, options: RunOptions) -> Association:
     """
     scene, labels = found.scene, found.scene.labels
     takes_part = labels.takes_part[labels.object_rows]
-    path, covariance = _path_by_odometry(scene)
+    path, covariance = _path_by_odometry(scene.recording)
+    if scene.mode == _core.Mode.MAPPING:
+        path, covariance = scene.poses, lambda images: None
     moving = find_moving(
         scene.recording,
         path,
@@ -51,13 +53,34 @@ def without_movers(found: Association, options: RunOptions) -> Association:
     return replace(found, left_out=dict(sorted((found.left_out | named).items())))
 
 
-def _path_by_odometry(scene: SceneMap) -> tuple[Floats, PathCovariance]:
+def moving_objects(
+    estimate: Estimate, recording: Recording, box_noise: BoxNoise, options: RunOptions
+) -> dict[int, str]:
+    """Return the ids of objects of an estimate that move, and why that is believed.
+
+    The recording has the ids of the objects that its boxes show, and the odometry with the
+    covariances that are believed.
+    """
+    object_id = recording.detections.object_id
+    shown = np.isin(object_id, estimate.object_ids)
+    path, covariance = _path_by_odometry(recording)
+    moving = find_moving(
+        recording,
+        path,
+        estimate.ellipsoids,
+        np.where(shown, np.searchsorted(estimate.object_ids, object_id), -1),
+        box_noise=box_noise,
+        size_prior=options.size_prior,
+        path_covariance=covariance,
+    )
+    return {int(estimate.object_ids[row]): why for row, why in moving.items()}
+
+
+def _path_by_odometry(recording: Recording) -> tuple[Floats, PathCovariance]:
     """Return the path of the odometry alone, (n, d), and its covariance."""
-    if scene.mode == _core.Mode.MAPPING:
-        return scene.poses, lambda images: None
-    odometry = scene.recording.odometry
+    odometry = recording.odometry
     path = _core.dead_reckon(odometry.pose_model, odometry.first_pose, odometry.relative)
-    motion = motion_of_camera(odometry.pose_model, scene.recording.camera)
+    motion = motion_of_camera(odometry.pose_model, recording.camera)
     return path, lambda images: _of_cameras(reckoned_covariance(odometry, path, images), motion)
 
 
