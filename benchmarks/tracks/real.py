@@ -135,6 +135,11 @@ def row_of(labels: Labels, source: str, seed: int) -> str:
         _FOLDER / boxes,
         replace(options, added_noise=NOISE, seed=seed),
     )
+    return describe(labels, f"{source}, {seed}", result)
+
+
+def describe(labels: Labels, name: str, result: dq.RunResult) -> str:
+    """Return the row of a result."""
     shown, estimate = result.detections, result.estimate
     mapped = [
         label_of(labels, shown.pose[own], shown.box[own])
@@ -157,7 +162,7 @@ def row_of(labels: Labels, source: str, seed: int) -> str:
     before, after = (error[when]["ate_rmse_m"] for when in ("before", "after"))
     in_map = sum(one in labels.moving for one in mapped)
     return (
-        f"| {source}, {seed} | {in_map} | {len(mapped) - in_map} | {before:.2f}, {after:.2f} | "
+        f"| {name} | {in_map} | {len(mapped) - in_map} | {before:.2f}, {after:.2f} | "
         f"{len(tracked)} of {len(labels.moving)}, {wrong} at rest | "
         f"{np.median(motion) if motion else np.nan:.3f} | "
         f"{np.nanmedian(speed) if speed else np.nan:.2f}, "

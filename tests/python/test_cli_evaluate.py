@@ -36,6 +36,7 @@ def test_tables_and_file(files, capsys):
         "objects",
         "reprojection_iou",
         "association",
+        "tracks",
     ]
     assert written["objects"]["matched"] == 3
     text = " ".join(shown.out.split())

@@ -24,6 +24,24 @@ def test_a_run_tracks_what_moves(tmp_path):
     assert len(dq.load_results(tmp_path / "results").tracks) == len(result.estimate.tracks)
 
 
+def test_a_car_ahead_is_one_track_and_nothing_else_moves():
+    street = make_street("following", 0)
+    result = dq.run(street.recording)
+    (track,) = result.estimate.tracks
+    assert np.median(np.abs(track.speeds - street.speeds[track.pose])) < 1.0
+    assert 0 not in result.estimate.object_ids
+
+
+def test_a_session_that_has_ended_has_no_mover_in_its_map():
+    street = make_street("oncoming", 3)
+    result = dq.run(street.recording, online=True)
+    assert 0 not in result.estimate.object_ids and len(result.estimate.object_ids) >= 5
+    (track,) = [one for one in result.estimate.tracks if np.median(one.speeds) > 5.0]
+    assert np.median(np.abs(track.speeds - street.speeds[track.pose])) < 2.0
+    poses = result.estimate.poses
+    assert np.linalg.norm(poses[:, :3] - street.true_path[:, :3], axis=1).max() < 0.2
+
+
 def test_a_recording_without_boxes_has_no_tracks():
     street = make_street("parked", 0)
     none = street.recording.detections.select(np.zeros(0, dtype=int))

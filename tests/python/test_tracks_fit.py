@@ -7,7 +7,13 @@ import pytest
 
 from dqslam import Camera
 from dqslam.tracks.body import Views, predict_boxes
-from dqslam.tracks.fit import covariance, evidence_of_path, fit_track
+from dqslam.tracks.fit import (
+    SHARE_OF_INFORMATION,
+    covariance,
+    evidence_with_path,
+    fit_track,
+    with_information,
+)
 from dqslam.tracks.motion import HEADING, SPEED, VEHICLE
 from dqslam.tracks.problem import TrackProblem, Trajectory, linearize
 from dqslam.tracks.sizes import body_size
@@ -71,6 +77,40 @@ def test_the_gradient_is_that_of_the_cost():
         assert found[place] == pytest.approx((costs[0] - costs[1]) / (2 * e), rel=1e-4, abs=1e-3)
 
 
+@pytest.mark.parametrize("moves", [MOVES, ~MOVES])
+def test_derivatives_by_cameras_that_the_ground_follows_are_small_differences(moves):
+    problem, truth = oncoming(noise_px=1.0)
+    plane = np.tile([0.1, 0.02, -0.03], (COUNT, 1))
+    problem = replace(problem, plane=plane, ground_follows=True)
+    random, e = np.random.default_rng(3), 1e-6
+    at = moved(truth, 0.02 * random.normal(size=6 * COUNT + 3))
+    first = truth.state[0]
+    equations = linearize(problem, at, moves, first)
+    for place in range(0, 6 * COUNT, 5):
+        step = (e * np.eye(6 * COUNT)[place]).reshape(-1, 6)
+        costs = [linearize(problem.moved(s * step), at, moves, first).cost for s in (1, -1)]
+        expected = (costs[0] - costs[1]) / (2 * e)
+        found = equations.gradient_camera.ravel()[place]
+        assert found == pytest.approx(expected, rel=1e-3, abs=0.05)
+
+
+def test_a_world_that_turns_as_a_whole_turns_tracks_and_leaves_speeds():
+    """All cameras turn about the origin by 1 mrad, the ground with them: so does the thing."""
+    problem, truth = oncoming()
+    views, turn = problem.views, np.array([0.0, 1e-3, 0.0])
+    axes = views.rotation.transpose(0, 2, 1)
+    shift = np.einsum("nij,nj->ni", axes, np.cross(turn, views.position))
+    motion = np.concatenate([shift, axes @ turn], axis=1).ravel()
+    change = {}
+    for follows in (True, False):
+        fit = fit_track(replace(problem, ground_follows=follows), truth, MOVES)
+        change[follows] = (covariance(fit)[1] @ motion)[:-3].reshape(-1, 6)
+    # It stays upright, which is what is left.
+    assert np.abs(change[True][:, SPEED]).max() < 0.005
+    assert np.abs(change[True][:, :2]).max() < 0.06
+    assert np.abs(change[False][:, SPEED]).max() > 0.02
+
+
 def dense(equations):
     """The normal equations as one matrix."""
     full = np.zeros((6 * COUNT + 3, 6 * COUNT + 3))
@@ -113,13 +153,68 @@ def test_a_path_that_is_exact_adds_no_evidence_and_one_that_errs_explains_a_cree
     )
     foot = np.column_stack([state[:, :2], np.zeros(COUNT)])
     box = predict_boxes(shifted, foot, state[:, HEADING], np.exp(truth.log_half)).box
-    fit = fit_track(replace(problem, box=box), Trajectory(state, truth.log_half), ~MOVES)
-    assert evidence_of_path(fit, np.zeros((6 * COUNT, 6 * COUNT))) == pytest.approx(0.0)
+    crept = replace(problem, box=box)
+    fit = fit_track(crept, Trajectory(state, truth.log_half), ~MOVES)
+    none = np.zeros((6 * COUNT, 6 * COUNT))
+    assert evidence_with_path(crept, fit, ~MOVES, none) == pytest.approx(fit.log_evidence, abs=1e-3)
     steps = np.tril(np.ones((COUNT, COUNT)))
     walk = np.kron(steps @ steps.T, np.diag([0.02**2] * 3 + [1e-8] * 3))
-    assert evidence_of_path(fit, walk) > 0.5
+    assert evidence_with_path(crept, fit, ~MOVES, walk) > fit.log_evidence + 0.5
     exact = fit_track(problem, truth, MOVES)
-    assert evidence_of_path(exact, walk) < 0.0
+    assert evidence_with_path(problem, exact, MOVES, walk) < exact.log_evidence
+
+
+def test_the_evidence_of_a_path_that_errs_a_little_is_that_of_a_normal():
+    """With small P: half of g^T (1 + P M)^-1 P g less that of log |1 + P M|, M by differences."""
+    problem, truth = oncoming(noise_px=0.5)
+    fit = fit_track(problem, truth, MOVES)
+    size, e = 6 * COUNT, 1e-4
+    gradient = fit.equations.gradient_camera.ravel()
+    one = np.zeros(size)
+    one[[0, 6, 13]] = 1.0, -0.5, 0.7
+    path = 1e-4 * np.outer(one, one)  # all cameras move by one random number
+    costs = [
+        fit_track(problem.moved((s * e * one).reshape(-1, 6)), fit.trajectory, MOVES).equations.cost
+        for s in (1.0, 0.0, -1.0)
+    ]
+    curvature = (costs[0] - 2.0 * costs[1] + costs[2]) / e**2
+    slope, variance = gradient @ one, 1e-4
+    both = 1.0 + variance * curvature
+    expected = 0.5 * variance * slope**2 / both - 0.5 * np.log(both)
+    found = evidence_with_path(problem, fit, MOVES, path) - fit.log_evidence
+    assert found == pytest.approx(expected, abs=0.02)
+
+
+def test_a_path_far_off_is_moved_to_where_a_thing_rests():
+    """Cameras that look up and down by 8 px make boxes jump. Boxes have 1 px."""
+    problem, truth = oncoming()
+    pitch = 8.0 / CAMERA.fy * np.array([0.0, 1.0, -1.0, 1.0, 0.0, -1.0, 1.0, 0.0])
+    motion = np.zeros((COUNT, 6))
+    motion[:, 3] = pitch
+    state = np.tile(truth.state[:1], (COUNT, 1))
+    state[:, SPEED] = 0.0
+    seen = problem.moved(motion).views
+    foot = np.column_stack([state[:, :2], np.zeros(COUNT)])
+    box = predict_boxes(seen, foot, state[:, HEADING], np.exp(truth.log_half)).box
+    jumping = replace(problem, box=box)
+    fit = fit_track(jumping, Trajectory(state, truth.log_half), ~MOVES)
+    assert fit.equations.cost > 40.0
+    path = np.kron(np.eye(COUNT), np.diag([1e-8] * 3 + [(8.0 / CAMERA.fy) ** 2, 1e-8, 1e-8]))
+    # What is left is less than the cost of the pitches themselves, six of one sigma.
+    volume = fit.log_evidence + fit.equations.cost
+    assert evidence_with_path(jumping, fit, ~MOVES, path) > volume - 30.0
+    assert fit.log_evidence < volume - 40.0
+
+
+def test_boxes_tell_four_fifths_of_what_the_weights_of_a_robust_loss_say():
+    problem, truth = oncoming(noise_px=1.0)
+    fit = fit_track(problem, truth, MOVES)
+    whole, told = fit.equations, with_information(problem, fit, MOVES).equations
+    np.testing.assert_allclose(told.of_boxes, SHARE_OF_INFORMATION * whole.of_boxes, rtol=1e-9)
+    np.testing.assert_allclose(told.below, whole.below)
+    prior = problem.size.precision
+    expected = prior + SHARE_OF_INFORMATION * (whole.corner - prior)
+    np.testing.assert_allclose(told.corner, expected)
 
 
 def test_a_start_behind_the_camera_has_no_estimate():

@@ -76,7 +76,7 @@ def test_two_things_show_no_ground():
         poses, Feet(feet.thing[two], feet.image[two], feet.place[two], feet.sigma[two])
     )
     assert ground.kind == "unknown"
-    assert ground.sigmas(np.zeros(1))[0] == pytest.approx(UNKNOWN_SIGMA_M, rel=1e-3)
+    assert ground.sigmas(np.zeros((1, 3)))[0] == pytest.approx(UNKNOWN_SIGMA_M, rel=1e-3)
 
 
 def test_things_that_move_correct_the_ground_by_their_weights():

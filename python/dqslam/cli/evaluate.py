@@ -47,7 +47,7 @@ def evaluate(
         float | None,
         typer.Option(
             help="Largest distance of a match by nearest, in meters. Default: the longest side of "
-            "the true object, or 1 m if sizes are unknown."
+            "the true object, or 1 m if sizes are unknown; 5 m for tracks."
         ),
     ] = None,
     boxes: Annotated[
@@ -55,6 +55,10 @@ def evaluate(
         typer.Option(help="CSV of boxes with true object ids, to evaluate the association."),
     ] = None,
     box_ids: Annotated[str, typer.Option(help="Column of --boxes with the ids.")] = "track_id",
+    tracks: Annotated[
+        Path | None,
+        typer.Option(help="CSV of true tracks of what moves: track_id, timestamp, x, y, z, speed."),
+    ] = None,
     max_time_difference: Annotated[
         float | None,
         typer.Option(
@@ -82,7 +86,7 @@ def evaluate(
     if max_time_difference is not None and not max_time_difference >= 0.0:
         raise ValueError(f"--max-time-difference: {max_time_difference:g} is negative")
     output = Output(quiet=quiet, as_json=json)
-    inputs = (groundtruth, objects, boxes)
+    inputs = (groundtruth, objects, boxes, tracks)
     span = given_span(since, until)
     if directory.is_dir():
         check_added(directory, _WRITTEN, "dqslam evaluate", inputs=inputs)
@@ -101,12 +105,15 @@ def evaluate(
             match=match,
             gate=gate,
             boxes=None if boxes is None else io.read_true_boxes(boxes, results.camera, box_ids),
+            tracks=None if tracks is None else io.read_true_tracks(tracks),
             max_time_difference=max_time_difference,
         )
     output.table(_trajectory(evaluation))
     output.table(_boxes_and_objects(evaluation))
     if evaluation["objects"] is not None:
         output.table(_pairs(evaluation["objects"]["pairs"]))
+    if evaluation["tracks"] is not None:
+        output.table(_tracks(evaluation["tracks"]))
     with added_files(directory, _WRITTEN, "dqslam evaluate", inputs=inputs) as folder:
         io.write_json(folder / "evaluation.json", evaluation)
         save_settings(context, folder / "evaluation.toml")
@@ -192,6 +199,27 @@ def _pairs(pairs: list[dict[str, Any]]) -> "Table":
         true_id = "" if pair["true_id"] is None else str(pair["true_id"])
         values = (_number(pair[name]) for name in names)
         table.add_row(str(pair["id"]), true_id, escape(pair["class_name"]), *values)
+    return table
+
+
+def _tracks(found: dict[str, Any]) -> "Table":
+    from rich.box import SIMPLE_HEAD
+    from rich.markup import escape
+    from rich.table import Table
+
+    counts = ", ".join(f"{found[name]} {name}" for name in ("found", "missed", "split", "invented"))
+    names = ("position", "motion", "speed", "nees", "speed_nees")
+    table = Table(title=f"tracks: {counts}", box=SIMPLE_HEAD)
+    for heading in ("id", "true id", "class", "images", "position, m", "motion, m", "speed, m/s"):
+        table.add_column(heading, justify="left" if heading == "class" else "right")
+    for heading in ("NEES", "of speed"):
+        table.add_column(heading, justify="right")
+    for pair in found["pairs"]:
+        what = (str(pair["id"]), str(pair["true_id"]), escape(pair["class_name"]))
+        values = (_number(pair[name]) for name in names)
+        table.add_row(*what, str(pair["images"]), *values)
+    together = ("position_median", "motion_median", "speed_median", "nees_mean", "speed_nees_mean")
+    table.add_row("all", "", "", "", *(_number(found[name]) for name in together))
     return table
 
 

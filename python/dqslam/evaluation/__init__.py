@@ -10,6 +10,7 @@ from dqslam.evaluation.evaluation import object_alignment as object_alignment
 from dqslam.evaluation.fits import BoxFits as BoxFits
 from dqslam.evaluation.fits import fit_boxes as fit_boxes
 from dqslam.evaluation.objects import evaluate_objects as evaluate_objects
+from dqslam.evaluation.tracks import evaluate_tracks as evaluate_tracks
 from dqslam.evaluation.trajectory import common_poses as common_poses
 from dqslam.evaluation.trajectory import evaluate_trajectory as evaluate_trajectory
 from dqslam.evaluation.trajectory import trajectory_error as trajectory_error

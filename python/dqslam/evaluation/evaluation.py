@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -10,8 +11,9 @@ from dqslam._checks import Floats
 from dqslam.evaluation.boxes import evaluate_association, evaluate_reprojection
 from dqslam.evaluation.errors import pose_nees
 from dqslam.evaluation.objects import Match, evaluate_objects
+from dqslam.evaluation.tracks import evaluate_tracks
 from dqslam.evaluation.trajectory import common_poses, evaluate_trajectory
-from dqslam.io import Results, Trajectory, TrueBoxes, TrueObjects
+from dqslam.io import Results, Trajectory, TrueBoxes, TrueObjects, TrueTrack
 from dqslam.metrics import Align, Alignment, align_poses, align_positions
 
 # Orientations that differ by more than this, radians, belong to different things.
@@ -29,6 +31,7 @@ def evaluate_results(
     match: Match = "nearest",
     gate: float | None = None,
     boxes: TrueBoxes | None = None,
+    tracks: Sequence[TrueTrack] | None = None,
     max_time_difference: float | None = None,
 ) -> dict[str, Any]:
     """Return the content of ``evaluation.json``; docs/evaluation.md has every key and unit.
@@ -47,6 +50,8 @@ def evaluate_results(
         The true objects and how to match them, see ``evaluate_objects``.
     boxes
         Boxes of known objects, to evaluate the association.
+    tracks
+        The true tracks of what moves, see ``evaluate_tracks``.
     max_time_difference
         Times that differ by at most this, in seconds, count as the same; by default half the
         interval of poses.
@@ -64,13 +69,17 @@ def evaluate_results(
     ate, rpe = errors_of(results.poses)
     odometry_ate, odometry_rpe = errors_of(results.initial_poses)
     alignment, by = object_alignment(results, results.poses[rows], true_poses, align)
-    object_errors, association = None, None
+    object_errors, association, track_errors = None, None, None
     if objects is not None:
         object_errors = evaluate_objects(
             results.objects, objects, alignment, match=match, gate=gate
         )
     if boxes is not None:
         association = evaluate_association(results, boxes, max_time_difference=max_time_difference)
+    if tracks is not None:
+        track_errors = evaluate_tracks(
+            results, tracks, alignment, gate=gate, max_time_difference=max_time_difference
+        )
     return {
         "align": align,
         "poses": len(rows),
@@ -90,6 +99,7 @@ def evaluate_results(
         "objects": object_errors,
         "reprojection_iou": evaluate_reprojection(results),
         "association": association,
+        "tracks": track_errors,
     }
 
 

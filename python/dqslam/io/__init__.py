@@ -59,6 +59,8 @@ from dqslam.io.trajectory import TRAJECTORY_FORMATS as TRAJECTORY_FORMATS
 from dqslam.io.trajectory import Trajectory as Trajectory
 from dqslam.io.trajectory import read_trajectory as read_trajectory
 from dqslam.io.trajectory import write_trajectory as write_trajectory
+from dqslam.io.true_tracks import TrueTrack as TrueTrack
+from dqslam.io.true_tracks import read_true_tracks as read_true_tracks
 from dqslam.io.truth import TrueBoxes as TrueBoxes
 from dqslam.io.truth import TrueObjects as TrueObjects
 from dqslam.io.truth import read_true_boxes as read_true_boxes

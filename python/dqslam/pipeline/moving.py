@@ -10,13 +10,14 @@ import numpy as np
 from dqslam import _core
 from dqslam._checks import Floats, Ints
 from dqslam.association import FINAL, Association
-from dqslam.assumptions import SizePriors
+from dqslam.assumptions import BoxNoise, SizePriors
+from dqslam.estimate import Estimate
 from dqslam.io.results.covariances import motion_of_camera
 from dqslam.pipeline.conclude import EstimatorOutput
 from dqslam.pipeline.options import RunOptions
-from dqslam.pipeline.problem import problem_of
+from dqslam.pipeline.problem import believed_problem
 from dqslam.recording import Recording
-from dqslam.tracks import PathCovariance, estimate_tracks, find_moving
+from dqslam.tracks import PathCovariance, estimate_tracks, find_moving, reckoned_covariance
 
 # Iterations of the estimate of the map that movers have been taken from.
 _ITERATIONS = 50
@@ -25,17 +26,23 @@ _ITERATIONS = 50
 def without_movers(found: Association, options: RunOptions) -> Association:
     """Leave objects out of the map that fit a place at rest, but move as their class does.
 
-    The map is then estimated without them.
+    The path of a map with a mover at rest makes it rest, and is believed too much. So objects are
+    judged by the path of the odometry alone, as uncertain as that is. The map is then estimated
+    without those that move.
     """
     scene, labels = found.scene, found.scene.labels
     takes_part = labels.takes_part[labels.object_rows]
+    path, covariance = _path_by_odometry(scene.recording)
+    if scene.mode == _core.Mode.MAPPING:
+        path, covariance = scene.poses, lambda images: None
     moving = find_moving(
         scene.recording,
-        scene.poses,
+        path,
         scene.ellipsoids,
         np.where(takes_part, labels.object_rows, -1),
         box_noise=scene.box_noise,
         size_prior=options.size_prior,
+        path_covariance=covariance,
     )
     if not moving:
         return found
@@ -44,6 +51,48 @@ def without_movers(found: Association, options: RunOptions) -> Association:
     scene.estimate_noise()
     named = {int(found.ids[row]): why for row, why in moving.items() if found.ids[row] >= 0}
     return replace(found, left_out=dict(sorted((found.left_out | named).items())))
+
+
+def moving_objects(
+    estimate: Estimate, recording: Recording, box_noise: BoxNoise, options: RunOptions
+) -> dict[int, str]:
+    """Return the ids of objects of an estimate that move, and why that is believed.
+
+    The recording has the ids of the objects that its boxes show, and the odometry with the
+    covariances that are believed.
+    """
+    object_id = recording.detections.object_id
+    shown = np.isin(object_id, estimate.object_ids)
+    path, covariance = _path_by_odometry(recording)
+    moving = find_moving(
+        recording,
+        path,
+        estimate.ellipsoids,
+        np.where(shown, np.searchsorted(estimate.object_ids, object_id), -1),
+        box_noise=box_noise,
+        size_prior=options.size_prior,
+        path_covariance=covariance,
+    )
+    return {int(estimate.object_ids[row]): why for row, why in moving.items()}
+
+
+def _path_by_odometry(recording: Recording) -> tuple[Floats, PathCovariance]:
+    """Return the path of the odometry alone, (n, d), and its covariance."""
+    odometry = recording.odometry
+    path = _core.dead_reckon(odometry.pose_model, odometry.first_pose, odometry.relative)
+    motion = motion_of_camera(odometry.pose_model, recording.camera)
+    return path, lambda images: _of_cameras(reckoned_covariance(odometry, path, images), motion)
+
+
+def _of_cameras(spread: Floats, motion: Floats) -> Floats:
+    """Turn the joint covariance of n poses, (k n, k n), into that of their cameras, (6 n, 6 n).
+
+    ``motion`` (6, k) is the motion of a camera by that of its pose.
+    """
+    count = len(spread) // motion.shape[1]
+    blocks = spread.reshape(count, -1, count, motion.shape[1])
+    moved = np.einsum("ab,ibjc,dc->iajd", motion, blocks, motion, optimize=True)
+    return np.asarray(moved).reshape(6 * count, 6 * count)
 
 
 def with_tracks(
@@ -79,19 +128,19 @@ def _path_covariance(
     if options.mode == _core.Mode.MAPPING or not output.estimate.is_ellipsoid.any():
         return lambda images: None
     # Most recordings have nothing that moves: the problem is laid out when it is asked for.
-    problem = functools.cache(lambda: problem_of(output, recording))
+    problem = functools.cache(lambda: believed_problem(output, recording))
     solver = options.solve_options()
     motion = motion_of_camera(recording.odometry.pose_model, recording.camera)
 
     def joint(images: Ints) -> Floats | None:
-        graph, state = problem()
+        laid_out = problem()
+        if laid_out is None:
+            return None
+        graph, state = laid_out
         try:
             spread = _core.joint_covariance(graph.core, solver, state, images.tolist(), [])
         except RuntimeError:  # a box is undefined, or the data leave a pose open
             return None
-        count = len(images)
-        blocks = spread.reshape(count, -1, count, motion.shape[1])
-        moved = np.einsum("ab,ibjc,dc->iajd", motion, blocks, motion)
-        return np.asarray(moved).reshape(6 * count, 6 * count)
+        return _of_cameras(spread, motion)
 
     return joint

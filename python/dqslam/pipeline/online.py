@@ -6,13 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 
+from dqslam import _core
+from dqslam._checks import Bools
 from dqslam.association import FINAL, not_found
 from dqslam.assumptions import BoxNoise
 from dqslam.estimate import Estimate
-from dqslam.graph import build_graph
+from dqslam.graph import Graph, build_graph, solve
 from dqslam.online.replay import Frame, replay
 from dqslam.online.slam import OnlineSlam
 from dqslam.pipeline.conclude import EstimatorOutput
+from dqslam.pipeline.moving import moving_objects
 from dqslam.pipeline.options import Progress, RunOptions
 from dqslam.recording import Recording
 from dqslam.uncertainty import Marginals, marginal_covariances
@@ -48,9 +51,14 @@ def estimate_online(
         order = np.argsort(recording.detections.pose, kind="stable")
         object_id[order] = np.concatenate(slam.assignments)
     shown = replace(recording, detections=replace(recording.detections, object_id=object_id))
+    estimate = _estimate(slam, recording) if is_final else slam.estimate()
+    believed = _with_believed_noise(slam, shown)
+    moving = moving_objects(estimate, believed, box_noise, options)
+    if moving:
+        estimate = _without(moving, slam, estimate, believed, box_noise)
     return EstimatorOutput(
-        _estimate(slam, recording) if is_final else slam.estimate(),
-        _marginals(slam, shown, box_noise),
+        estimate,
+        _marginals(slam, estimate, believed, box_noise),
         summary,
         object_id=object_id,
         keyframes=len(slam.keyframes),
@@ -72,19 +80,74 @@ def _estimate(slam: OnlineSlam, recording: Recording) -> Estimate:
     return replace(estimate, dropped=dict(sorted(dropped.items())))
 
 
-def _marginals(slam: OnlineSlam, recording: Recording, noise: BoxNoise) -> Marginals | None:
-    """Return the covariances of what a polish has found, from the boxes that took part."""
-    estimate, boxes = slam.estimate(), recording.detections
+def _without(
+    moving: dict[int, str],
+    slam: OnlineSlam,
+    estimate: Estimate,
+    recording: Recording,
+    noise: BoxNoise,
+) -> Estimate:
+    """Return the estimate without objects that a session has mapped although they move."""
+    stays = ~np.isin(estimate.object_ids, list(moving))
+    dropped = dict(sorted({**estimate.dropped, **moving}.items()))
+    rest = _selected(estimate, stays)
+    graph = _problem(slam, rest, recording, noise)
+    if graph is None:
+        return replace(rest, poses=estimate.initial_poses, dropped=dropped)
+    rows = np.searchsorted(rest.object_ids, graph.object_ids)
+    start = _core.State(rest.poses, rest.ellipsoids[rows])
+    solved, _ = solve(graph, slam.solve_options, start=start)
+    kept = _selected(rest, np.isin(rest.object_ids, solved.object_ids))
+    return replace(
+        kept,
+        poses=solved.poses,
+        ellipsoids=solved.ellipsoids,
+        dual_quadrics=solved.dual_quadrics,
+        dropped=dict(sorted({**dropped, **solved.dropped}.items())),
+    )
+
+
+def _selected(estimate: Estimate, rows: Bools) -> Estimate:
+    """Return some of the objects of an estimate, by a flag for each (o,)."""
+    ids = estimate.object_ids[rows].tolist()
+    return replace(
+        estimate,
+        object_ids=estimate.object_ids[rows],
+        class_names=tuple(estimate.class_names[row] for row in np.flatnonzero(rows).tolist()),
+        observations=estimate.observations[rows],
+        dual_quadrics=estimate.dual_quadrics[rows],
+        ellipsoids=estimate.ellipsoids[rows],
+        contradicted={one: why for one, why in estimate.contradicted.items() if one in ids},
+    )
+
+
+def _with_believed_noise(slam: OnlineSlam, recording: Recording) -> Recording:
+    """Return the recording with the covariances of its steps that the session believes."""
+    if slam.odometry_noise is None:
+        return recording
+    odometry = recording.odometry
+    steps = slam.odometry_noise.covariance(len(odometry.relative), odometry.pose_model)
+    return replace(recording, odometry=replace(odometry, covariance=steps))
+
+
+def _problem(
+    slam: OnlineSlam, estimate: Estimate, recording: Recording, noise: BoxNoise
+) -> Graph | None:
+    """Lay out the boxes of keyframes that show objects of an estimate; None without any."""
+    boxes = recording.detections
     part = np.isin(boxes.object_id, estimate.object_ids) & np.isin(boxes.pose, slam.keyframes)
     if not part.any():
         return None
     used = replace(recording, detections=boxes.select(part))
-    if slam.odometry_noise is not None:
-        odometry = recording.odometry
-        steps = slam.odometry_noise.covariance(len(odometry.relative), odometry.pose_model)
-        used = replace(used, odometry=replace(odometry, covariance=steps))
-    graph = build_graph(used, box_noise=noise, size_prior=slam.size_prior)
-    return marginal_covariances(graph, estimate, slam.solve_options)
+    return build_graph(used, box_noise=noise, size_prior=slam.size_prior)
+
+
+def _marginals(
+    slam: OnlineSlam, estimate: Estimate, recording: Recording, noise: BoxNoise
+) -> Marginals | None:
+    """Return the covariances of what a polish has found, from the boxes that took part."""
+    graph = _problem(slam, estimate, recording, noise)
+    return None if graph is None else marginal_covariances(graph, estimate, slam.solve_options)
 
 
 def _describe_step(slam: OnlineSlam, frame: Frame) -> str:

@@ -68,13 +68,25 @@ def kept_options(options: RunOptions) -> _core.SolveOptions:
 def kept_problem(output: EstimatorOutput, recording: Recording, mode: _core.Mode) -> Graph | None:
     """Return the problem that a result keeps, to be solved together with other recordings.
 
-    It has the boxes that took part in the estimate, as accurate as all boxes of an object are
-    together, and the odometry with the covariances that were believed. There is none without an
-    object, where poses are known, and with absolute positions, which it could not have.
+    There is none without an object, where poses are known, and with absolute positions, which it
+    could not have.
     """
     has_positions = recording.absolute is not None and len(recording.absolute) > 0
-    if mode == _core.Mode.MAPPING or has_positions or not shown_boxes(output).size:
+    if mode == _core.Mode.MAPPING or has_positions:
         return None
+    believed = believed_problem(output, recording)
+    return None if believed is None else believed[0]
+
+
+def believed_problem(
+    output: EstimatorOutput, recording: Recording
+) -> tuple[Graph, _core.State] | None:
+    """Return the problem of an estimate with the noise that it believes in the end, and its start.
+
+    It has the boxes that took part in the estimate, as accurate as all boxes of an object are
+    together, and the odometry with the covariances that were believed. There is none without an
+    object.
+    """
     if output.took_part is not None:
         output = replace(output, object_id=np.where(output.took_part, output.object_id, -1))
     if not shown_boxes(output).size:
@@ -84,9 +96,9 @@ def kept_problem(output: EstimatorOutput, recording: Recording, mode: _core.Mode
         recording = replace(recording, odometry=odometry)
         output = replace(output, odometry_noise=None)
     graph, state = problem_of(output, recording)
-    if output.repeated is None:
-        return graph
-    return _with_repeated_errors(graph, state, output.repeated, output)
+    if output.repeated is not None:
+        graph = _with_repeated_errors(graph, state, output.repeated, output)
+    return graph, state
 
 
 def state_of(output: EstimatorOutput, graph: Graph) -> _core.State:

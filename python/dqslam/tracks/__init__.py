@@ -1,6 +1,7 @@
 """Things that move: tracks of position, heading and speed, from boxes that the map leaves over."""
 
-from dqslam.tracks.estimate import PathCovariance as PathCovariance
 from dqslam.tracks.estimate import Tracked as Tracked
 from dqslam.tracks.estimate import estimate_tracks as estimate_tracks
 from dqslam.tracks.mapped import find_moving as find_moving
+from dqslam.tracks.reckoned import PathCovariance as PathCovariance
+from dqslam.tracks.reckoned import reckoned_covariance as reckoned_covariance

@@ -53,6 +53,8 @@ class Scene:
         axes = Rotation.from_quat(self.cameras[poses, 3:]).as_matrix()
         views = Views(camera, turn.T @ axes, self.cameras[poses, :3] @ turn)
         depth = camera.fy * 2.0 * np.exp(size.log_half[2]) / (box[:, 3] - box[:, 1])
+        middle = 0.5 * (box[:, 0] + box[:, 2])
+        ray = (middle - camera.cx) / camera.fx, (box[:, 3] - camera.cy) / camera.fy
         variance = np.diagonal(self.box_noise.covariance(box, camera), axis1=1, axis2=2)
         return TrackProblem(
             views,
@@ -61,9 +63,10 @@ class Scene:
             variance,
             detections.truncated[rows],
             self.ground.planes(views.rotation, views.position),
-            self.ground.sigmas(depth),
+            self.ground.sigmas(depth[:, None] * np.column_stack([*ray, np.ones(len(box))])),
             size,
             motion_noise(class_name),
+            self.ground.kind == "below the camera",
         )
 
     def class_name(self, rows: Ints) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,12 +15,11 @@ from dqslam.tracks.candidates import FEWEST_IMAGES, Scene, group_boxes, make_sce
 from dqslam.tracks.fit import TrackFit, covariance, fit_track
 from dqslam.tracks.ground import Ground
 from dqslam.tracks.judge import Judgment, judge
+from dqslam.tracks.mixture import mixed
 from dqslam.tracks.motion import ABOVE, HEADING, SIZE, SPEED, TURN, X, Y
 from dqslam.tracks.problem import TrackProblem, Trajectory
-
-PathCovariance = Callable[[Ints], Floats | None]
-"""Joint covariance (6 n, 6 n) of small motions [m, rad] of the cameras at poses (n,), each in its
-own frame; None where it is unknown."""
+from dqslam.tracks.reckoned import PathCovariance
+from dqslam.tracks.switches import Explanation
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +115,7 @@ def _grounds_of_movers(scene: Scene, moving: list[tuple[Ints, Judgment]]) -> lis
     loose = replace(scene, ground=scene.ground.of_unknown_height())
     stands = np.zeros((len(moving), 3))
     for number, (rows, judged) in enumerate(moving):
-        problem, fit = _refit(loose, rows, judged)
+        problem, (fit,) = _refit(loose, rows, judged, judged.explanations[:1])
         state, views = fit.trajectory.state, problem.views
         distance = np.linalg.norm(state[:, X : Y + 1] - views.position[:, :2], axis=1)
         row = int(np.argmin(distance))
@@ -128,24 +127,30 @@ def _grounds_of_movers(scene: Scene, moving: list[tuple[Ints, Judgment]]) -> lis
     return [scene.ground.corrected(*some.T) for some in (*others, stands)]
 
 
-def _refit(scene: Scene, rows: Ints, judged: Judgment) -> tuple[TrackProblem, TrackFit]:
-    """Return the problem of some boxes (n,) in a scene that is a little different, and its fit.
+def _refit(
+    scene: Scene, rows: Ints, judged: Judgment, ways: Sequence[Explanation]
+) -> tuple[TrackProblem, list[TrackFit]]:
+    """Return the problem of some boxes (n,) in a scene that is a little different, and fits of it.
 
-    Where no step leads on, the estimate stays where it is.
+    Where no step leads on, an estimate stays where it is.
     """
     class_name = scene.class_name(rows)
     size = scene.size(class_name)
     assert size is not None  # what has none was not judged
     problem = scene.problem(rows, size, class_name)
-    fit = fit_track(problem, _in_sigmas_of(problem, judged), judged.moves)
-    return problem, judged.fit if fit is None else fit
+    fits = []
+    for way in ways:
+        start = _in_sigmas_of(problem, judged.above, way.fit.trajectory)
+        fit = fit_track(problem, start, way.moves)
+        fits.append(way.fit if fit is None else fit)
+    return problem, fits
 
 
-def _in_sigmas_of(problem: TrackProblem, judged: Judgment) -> Trajectory:
-    """Return the estimate of a judgment with heights in the sigmas of another problem."""
-    state = judged.fit.trajectory.state.copy()
-    state[:, ABOVE] *= judged.above / problem.above
-    return Trajectory(state, judged.fit.trajectory.log_half)
+def _in_sigmas_of(problem: TrackProblem, above: Floats, at: Trajectory) -> Trajectory:
+    """Return an estimate with heights in the sigmas of another problem."""
+    state = at.state.copy()
+    state[:, ABOVE] *= above / problem.above
+    return Trajectory(state, at.log_half)
 
 
 def _track(
@@ -154,16 +159,12 @@ def _track(
     """Return the track of some boxes (n,) in the world, with its uncertainty."""
     from scipy.spatial.transform import Rotation
 
-    (problem, fit), count = _refit(scene, rows, judged), len(rows)
-    state, log_half = fit.trajectory.state.copy(), fit.trajectory.log_half
+    count = len(rows)
+    problem, fits = _refit(scene, rows, judged, judged.explanations)
     poses, ground = scene.recording.detections.pose[rows], scene.ground
-    spread, by_camera = covariance(fit)
-    path = path_covariance(poses)
-    if path is not None:
-        spread = spread + by_camera @ path @ by_camera.T
-    if np.median(state[:, SPEED]) < 0.0:  # it looks the same from behind: forward is where it goes
-        state[:, HEADING] += np.pi
-        state[:, SPEED] *= -1.0
+    ways = list(zip(fits, judged.explanations, judged.weights.tolist(), strict=True))
+    moments = mixed(problem, ways, path_covariance(poses))
+    state, blocks, log_half = moments.state, moments.covariance, moments.log_half
     half = np.exp(log_half)
     center = problem.feet(state) + [0.0, 0.0, half[2]]
     # The center by x, y and height of the foot, and by the logarithm of half the height.
@@ -171,14 +172,10 @@ def _track(
     jacobian[:, range(3), range(3)] = 1.0
     jacobian[:, 2, :2], jacobian[:, 2, ABOVE] = problem.plane[:, 1:], problem.above
     jacobian[:, 2, SIZE + 2] = half[2]
-    own = np.arange(SIZE * count).reshape(count, SIZE)
-    places = np.column_stack([own, np.tile(SIZE * count + np.arange(3), (count, 1))])
-    blocks = spread[places[:, :, None], places[:, None, :]]
     turn = ground.world_from_ground
     of_center = turn @ jacobian @ blocks @ jacobian.transpose(0, 2, 1) @ turn.T
     sigma = np.sqrt(np.diagonal(blocks, axis1=1, axis2=2))
     upright = Rotation.from_euler("z", state[:, HEADING, None])
-    moving = np.append(judged.moves, False) | np.append(False, judged.moves)
     return Track(
         track_id,
         scene.class_name(rows),
@@ -190,7 +187,7 @@ def _track(
         np.arctan2(np.sin(state[:, HEADING]), np.cos(state[:, HEADING])),
         state[:, SPEED],
         state[:, TURN],
-        moving,
+        moments.moving > 0.5,
         2.0 * half,
         of_center,
         sigma[:, HEADING],

@@ -2,18 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from dqslam._checks import Bools, Floats
 from dqslam.tracks.motion import SIZE
-from dqslam.tracks.problem import Equations, TrackProblem, Trajectory, linearize
+from dqslam.tracks.problem import FREEDOM, Equations, TrackProblem, Trajectory, linearize
 
 MAX_ITERATIONS = 40
 # The cost is as low as it gets if a step lowers it by less.
 TOLERANCE = 1e-3
 _FIRST_DAMPING, _MOST_DAMPING = 1e-3, 1e8
+# A start far from the boxes is brought near with boxes whose sigmas are so many times larger.
+LESS_SURE = (20.0, 4.0)
+COARSE_ITERATIONS = 15
+# The path is moved in so many rounds at most, as long as that lowers the cost by more than this, by
+# one of these shares of a step.
+_PATH_ROUNDS, _PATH_TOLERANCE = 6, 0.05
+_SHARES_OF_STEP = (1.0, 0.5, 0.2)
+# The Fisher information of four errors of a Student t distribution, as a share of their mean weight
+# in the normal equations.
+SHARE_OF_INFORMATION = (FREEDOM + 4.0) / (FREEDOM + 6.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +42,11 @@ class _Factor:
     """The factor of normal equations: a banded chain, and its border."""
 
     def __init__(self, equations: Equations, damping: float = 0.0) -> None:
-        """Factorize, the diagonal times 1 + ``damping``; LinAlgError where that is impossible."""
+        """Factorize, with ``damping`` times what boxes tell; LinAlgError where that is impossible.
+
+        What rests is bound so stiffly from image to image that a share of the whole diagonal would
+        keep it where it is.
+        """
         from scipy.linalg import cholesky_banded
 
         count = len(equations.diagonal)
@@ -43,7 +57,7 @@ class _Factor:
         rows, columns = (index.ravel() for index in np.indices((SIZE, SIZE)))
         place = np.arange(count - 1)[:, None] * SIZE + columns
         band[SIZE + rows - columns, place] = equations.below[:, rows, columns]
-        band[0] *= 1.0 + damping
+        band[0] += damping * equations.of_boxes.ravel()
         self._chain: Floats = cholesky_banded(band, lower=True, check_finite=False)
         self._border = equations.border.reshape(-1, 3)
         self._reduced = self._solve_chain(self._border)
@@ -116,25 +130,105 @@ def fit_track(
     return TrackFit(at, equations, evidence, converged)
 
 
-def evidence_of_path(fit: TrackFit, path: Floats) -> float:
-    """Return what the log evidence gains if the cameras are not exact, but have a joint covariance.
+def fit_from_afar(
+    problem: TrackProblem,
+    start: Trajectory,
+    moves: Bools,
+    *,
+    less_sure: tuple[float, ...] = LESS_SURE,
+) -> TrackFit | None:
+    """Minimize from a start that may be far off: first with boxes that are less sure."""
+    at = start
+    for factor in less_sure:
+        coarse = replace(problem, variance=problem.variance * factor**2)
+        near = fit_track(coarse, at, moves, max_iterations=COARSE_ITERATIONS)
+        if near is None:
+            return None
+        at = near.trajectory
+    return fit_track(problem, at, moves)
 
-    The covariance (6 n, 6 n) is of small motions of the cameras, each in its own frame [m, rad].
-    With g and M the gradient and the second derivative by these motions, the states eliminated, and
-    P the covariance, the motions that fit best lower the cost by g (1 + P M)^-1 P g / 2, and their
-    volume costs log |1 + P M| / 2.
+
+def with_information(problem: TrackProblem, fit: TrackFit, moves: Bools) -> TrackFit:
+    """Return a fit whose equations tell as much as the boxes do, for covariances.
+
+    The weights of a robust loss minimize the cost, but those of boxes that fit by chance are too
+    large: a covariance with them is too small, by a fifth where boxes alone tell a state. Where a
+    box is undefined, the equations stay.
     """
-    equations = fit.equations
-    _, change = covariance(fit)
-    count = len(equations.diagonal)
-    information = _coupling(equations).T @ change
-    for row in range(count):
-        own = slice(6 * row, 6 * row + 6)
-        information[own, own] += equations.of_camera[row]
-    gradient = equations.gradient_camera.ravel()
-    both = np.eye(6 * count) + path @ information
-    gain = gradient @ np.linalg.solve(both, path @ gradient)
-    return 0.5 * float(gain) - 0.5 * float(np.linalg.slogdet(both)[1])
+    at = fit.trajectory
+    equations = linearize(problem, at, moves, at.state[0], information=SHARE_OF_INFORMATION)
+    return fit if equations is None else replace(fit, equations=equations)
+
+
+def evidence_with_path(problem: TrackProblem, fit: TrackFit, moves: Bools, path: Floats) -> float:
+    """Return the log evidence if the cameras are not exact, but have a joint covariance.
+
+    The covariance P (6 n, 6 n) is of small motions c of the cameras, each in its frame [m, rad].
+    They are moved to where boxes and P together have them, for boxes that seem to be wrong may fit
+    then: with g and M the gradient and the second derivative of the cost by the motions, the states
+    eliminated, to (1 + P M)^-1 P (M c - g). The motions cost c^T P^-1 c / 2 there, and their volume
+    log |1 + P M| / 2.
+    """
+    found = [_move_path(problem, fit, moves, path, np.zeros(6 * len(problem.box)))]
+    # A box that fits nowhere near pulls too little to bring the path to where it does.
+    coarse = replace(problem, variance=problem.variance * LESS_SURE[-1] ** 2)
+    near = fit_track(coarse, fit.trajectory, moves, max_iterations=COARSE_ITERATIONS)
+    if near is not None:
+        near, force, _ = _move_path(coarse, near, moves, path, np.zeros(6 * len(problem.box)))
+        there = problem.moved((path @ force).reshape(-1, 6))
+        at = fit_track(there, near.trajectory, moves)
+        if at is not None:
+            found.append(_move_path(problem, at, moves, path, force))
+    at, force, cost = min(found, key=lambda one: one[2])
+    both = np.eye(len(force)) + path @ _information_of_cameras(at)
+    volume = float(np.linalg.slogdet(both)[1])
+    return at.log_evidence + at.equations.cost - cost - 0.5 * volume
+
+
+def _move_path(
+    problem: TrackProblem, fit: TrackFit, moves: Bools, path: Floats, force: Floats
+) -> tuple[TrackFit, Floats, float]:
+    """Move the cameras by the path's covariance times forces (6 n,), to where the cost is lowest.
+
+    ``fit`` is that of the cameras moved by the given forces. Return the last one, its forces, and
+    the cost with that of the motions.
+    """
+    at, motion = fit, path @ force
+    cost = fit.equations.cost + 0.5 * float(motion @ force)
+    for _ in range(_PATH_ROUNDS):
+        information = _information_of_cameras(at)
+        pull = information @ motion - at.equations.gradient_camera.ravel()
+        both = np.eye(len(force)) + path @ information
+        step = np.linalg.solve(both, path @ pull) - motion
+        change = pull - information @ (motion + step) - force
+        for share in _SHARES_OF_STEP:
+            moved, forced = motion + share * step, force + share * change
+            there = problem.moved(moved.reshape(-1, 6))
+            after = fit_track(there, at.trajectory, moves, max_iterations=COARSE_ITERATIONS)
+            total = np.inf if after is None else after.equations.cost + 0.5 * float(moved @ forced)
+            if after is not None and total < cost:
+                break
+        else:
+            break
+        gain, at, motion, force, cost = cost - total, after, moved, forced, total
+        if gain < _PATH_TOLERANCE:
+            break
+    return at, force, cost
+
+
+def _information_of_cameras(fit: TrackFit) -> Floats:
+    """Return the second derivative by motions of the cameras, the states eliminated, (6 n, 6 n)."""
+    coupling = _coupling(fit.equations)
+    information = -coupling.T @ np.vstack(
+        _Factor(fit.equations).solve(coupling[:-3], coupling[-3:])
+    )
+    for row, own in enumerate(fit.equations.of_camera):
+        place = slice(6 * row, 6 * row + 6)
+        information[place, place] += own
+    for row, own in enumerate(fit.equations.rest_by_camera):
+        place = slice(6 * row, 6 * row + 12)
+        information[place, place] += np.outer(own, own)
+    return np.asarray(information)
 
 
 def covariance(fit: TrackFit) -> tuple[Floats, Floats]:
@@ -160,4 +254,8 @@ def _coupling(equations: Equations) -> Floats:
         columns = slice(6 * row, 6 * row + 6)
         coupling[SIZE * row : SIZE * row + SIZE, columns] = equations.by_camera[row, :SIZE]
         coupling[-3:, columns] = equations.by_camera[row, SIZE:]
+    steps = zip(equations.rest_by_state, equations.rest_by_camera, strict=True)
+    for row, (by_state, by_camera) in enumerate(steps):
+        place = slice(6 * row, 6 * row + 12)
+        coupling[place, place] += np.outer(by_state, by_camera)
     return coupling

@@ -52,7 +52,10 @@ class Ground:
     slope_sigma: float
     """What that grows by with the distance from the camera, as a share of it."""
     common_sigma_m: float
-    """Of the height of the ground, the same everywhere, meters."""
+    """Of the height of the ground near the camera, the same for all things, meters."""
+    tilt: Floats
+    """Covariance of that height [m] with the slopes of the ground along the axes of the camera, or
+    of the ground where that is level, shape (4, 4): the three slopes first."""
     feet: int
     """How many lower ends of things have shown it."""
 
@@ -69,9 +72,14 @@ class Ground:
         beneath = position[:, 2] - self.height_m / normal[:, 2]
         return np.column_stack([beneath - np.sum(slope * position[:, :2], axis=1), slope])
 
-    def sigmas(self, distance: Floats) -> Floats:
-        """Return the sigmas [m] of the height at which a thing stands at distances [m], (n,)."""
-        return np.sqrt(self._own(distance) ** 2 + self.common_sigma_m**2)
+    def sigmas(self, toward: Floats) -> Floats:
+        """Return the sigmas [m] of the height of the foot of a thing, (n,).
+
+        ``toward`` (n, 3) is where it is in the frame of the camera, meters.
+        """
+        place = np.column_stack([toward, np.ones(len(toward))])
+        common = np.einsum("ni,ij,nj->n", place, self.tilt, place)
+        return np.asarray(np.sqrt(self._own(np.linalg.norm(toward, axis=1)) ** 2 + common))
 
     def corrected(self, above: Floats, variance: Floats, distance: Floats) -> Ground:
         """Return the ground as corrected by heights [m] at which things stand above it, (t,).
@@ -83,11 +91,17 @@ class Ground:
         total = self.common_sigma_m**-2 + weight.sum()
         rise = float(weight @ above / total)
         way = -1.0 if self.kind == "below the camera" else 1.0
-        return replace(self, height_m=self.height_m + way * rise, common_sigma_m=float(total**-0.5))
+        known = self._of_height_sigma(float(total**-0.5))
+        return replace(known, height_m=self.height_m + way * rise)
 
     def of_unknown_height(self) -> Ground:
         """Return a ground of the same shape whose height is unknown."""
-        return replace(self, common_sigma_m=UNKNOWN_SIGMA_M)
+        return self._of_height_sigma(UNKNOWN_SIGMA_M)
+
+    def _of_height_sigma(self, sigma: float) -> Ground:
+        scale = np.array([1.0, 1.0, 1.0, sigma / self.common_sigma_m])
+        tilt = scale[:, None] * self.tilt * scale
+        return replace(self, common_sigma_m=sigma, tilt=tilt)
 
     def _own(self, distance: Floats) -> Floats:
         return np.asarray(np.hypot(self.sigma_m, self.slope_sigma * distance))
@@ -119,7 +133,8 @@ def find_ground(cameras: Floats, feet: Feet) -> Ground:
     if count < FEWEST_FEET:
         height = float((cameras[:, :3] @ up).mean())
         sigmas = (LEAST_SIGMA_M, LEAST_SLOPE, UNKNOWN_SIGMA_M)
-        return Ground(turn, "unknown", np.eye(3)[2], height, *sigmas, count)
+        tilt = np.diag([0.0, 0.0, 0.0, UNKNOWN_SIGMA_M**2])
+        return Ground(turn, "unknown", np.eye(3)[2], height, *sigmas, tilt, count)
     axes = Rotation.from_quat(cameras[:, 3:]).as_matrix()
     toward = np.einsum("nji,nj->ni", axes[feet.image], feet.place - cameras[feet.image, :3])
     distance = np.linalg.norm(toward, axis=1)
@@ -138,14 +153,19 @@ def find_ground(cameras: Floats, feet: Feet) -> Ground:
         scatter = _weighted_median(away, share)
         sigma, slope = _spread(away, distance, share, feet.sigma)
         weight = share / (sigma**2 + (slope * distance) ** 2 + feet.sigma**2)
+        tilt = np.zeros((4, 4))
         if kind == "below the camera":  # how it is turned is as unknown as how high it is
             columns, prior = _columns(normal, turned_sigma, toward)
-            variance = np.linalg.inv(columns.T @ (weight[:, None] * columns) + prior)[2, 2]
+            found = np.linalg.inv(columns.T @ (weight[:, None] * columns) + prior)
+            by_found = np.zeros((4, 3))
+            by_found[:3, :2], by_found[3, 2] = np.linalg.svd(normal[None])[2][1:].T, 1.0
+            tilt = by_found @ found @ by_found.T
         else:
-            variance = 1.0 / weight.sum()
+            tilt[3, 3] = 1.0 / weight.sum()
         # A median is less certain than a mean by pi / 2; of few feet, the spread is itself unsure.
-        common = float(np.sqrt(0.5 * np.pi * variance * (1.0 + 3.0 / count)))
-        ground = Ground(turn, kind, own, way * middle, sigma, slope, common, count)
+        tilt *= 0.5 * np.pi * (1.0 + 3.0 / count)
+        common = float(np.sqrt(tilt[3, 3]))
+        ground = Ground(turn, kind, own, way * middle, sigma, slope, common, tilt, count)
         choices.append((scatter, ground))
     return min(choices, key=lambda one: one[0])[1]
 

@@ -14,8 +14,9 @@ from dqslam.assumptions import BoxNoise, SizePrior, SizePriors
 from dqslam.recording import Recording
 from dqslam.tracks.candidates import FEWEST_IMAGES, Scene, make_scene, one_an_image, thinned
 from dqslam.tracks.judge import Judgment, judge
+from dqslam.tracks.reckoned import PathCovariance
 
-# Movers in the map show a wrong ground: without those that are found, the others are judged again.
+# Movers in the map show a wrong ground: all are judged again without those that were found.
 _ROUNDS = 3
 # What rests with a higher probability is not judged again.
 SURELY_RESTS = 0.9999
@@ -29,8 +30,12 @@ def find_moving(
     *,
     box_noise: BoxNoise,
     size_prior: SizePrior | SizePriors | None = None,
+    path_covariance: PathCovariance = lambda images: None,
 ) -> dict[ObjectRow, str]:
     """Return objects of a map that move, and why that is believed; of classes of known size only.
+
+    The path and its covariance should not follow from the objects that are judged: a map that has
+    a mover at rest has a path that makes it rest, and believes it.
 
     Parameters
     ----------
@@ -40,39 +45,43 @@ def find_moving(
         Row of the ellipsoid that each box shows, -1 for none, shape (m,).
     size_prior
         Sizes that were told by class; those of traffic are known.
+    path_covariance
+        By default the path is exact.
     """
-    moving = dict[ObjectRow, str]()
     shown = np.unique(object_rows[object_rows >= 0])
-    open_rows = shown.tolist()
+    boxes = {row: np.flatnonzero(object_rows == row) for row in shown.tolist()}
+    candidates = list(boxes)
+    moving = dict[ObjectRow, str]()
+    judged: dict[int, Judgment] = {}
     for _ in range(_ROUNDS):
         resting = shown[~np.isin(shown, list(moving))]
         at_rest = np.where(np.isin(object_rows, resting), object_rows, -1)
         scene = make_scene(recording, poses, ellipsoids, at_rest, box_noise, size_prior)
-        judged = {row: _judge(scene, np.flatnonzero(object_rows == row)) for row in open_rows}
-        found = {
-            ObjectRow(row): _reason(scene.class_name(np.flatnonzero(object_rows == row)), one)
+        for row in candidates:
+            one = _judge(scene, boxes[row], path_covariance)
+            if one is not None:
+                judged[row] = one
+        before = moving
+        moving = {
+            ObjectRow(row): _reason(scene.class_name(boxes[row]), one)
             for row, one in judged.items()
-            if one is not None and one.is_mover
+            if one.is_mover
         }
-        if not found:
+        if moving.keys() == before.keys():
             break
-        moving |= found
-        open_rows = [
-            row
-            for row, one in judged.items()
-            if row not in found and one is not None and one.probability["rests"] < SURELY_RESTS
-        ]
+        candidates = [row for row, one in judged.items() if one.probability["rests"] < SURELY_RESTS]
     return moving
 
 
-def _judge(scene: Scene, rows: Ints) -> Judgment | None:
+def _judge(scene: Scene, rows: Ints, path_covariance: PathCovariance) -> Judgment | None:
     """Judge what some boxes (b,) show; None where that cannot be done."""
     rows = thinned(one_an_image(scene.recording, rows))
     class_name = scene.class_name(rows)
     size = scene.size(class_name)
     if size is None or len(rows) < FEWEST_IMAGES:
         return None
-    return judge(scene.problem(rows, size, class_name))
+    path = path_covariance(scene.recording.detections.pose[rows])
+    return judge(scene.problem(rows, size, class_name), path)
 
 
 def _reason(class_name: str, judged: Judgment) -> str:

@@ -70,9 +70,18 @@ class Steps:
 
 
 def compare_steps(
-    state: Floats, seconds: Floats, moves: Bools, noise: MotionNoise, drift: float
+    state: Floats,
+    seconds: Floats,
+    moves: Bools,
+    noise: MotionNoise,
+    drift: float,
+    plane: Floats,
+    above: Floats,
 ) -> Steps:
     """Compare successive states (n, 6) with a motion over ``seconds`` (n - 1,).
+
+    What moves stays at its height above the ground, as an image shows that; what rests stays where
+    it is in the world, whatever the images say of the ground.
 
     Parameters
     ----------
@@ -80,6 +89,9 @@ def compare_steps(
         Whether the thing moves between two states, shape (n - 1,); else it rests at the later one.
     drift
         Density of the height above the ground, sigmas / sqrt(s).
+    plane, above
+        The ground c + a x + b y of each image, rows of c, a, b, (n, 3), and what heights above it
+        are in units of, meters, (n,).
     """
     before, after = state[:-1], state[1:]
     count, dt = len(seconds), seconds
@@ -99,6 +111,15 @@ def compare_steps(
     for row in (ABOVE, HEADING, SPEED, TURN):
         error[:, row] = after[:, row] - before[:, row]
         by_to[:, row, row], by_from[:, row, row] = 1.0, -1.0
+    rests = ~moves
+    height = (
+        plane[:, 0] + np.sum(plane[:, 1:] * state[:, X : Y + 1], axis=1) + above * state[:, ABOVE]
+    )
+    unit = above[1:][rests]
+    error[rests, ABOVE] = np.diff(height)[rests] / unit
+    by_to[rests, ABOVE, X : Y + 1] = plane[1:, 1:][rests] / unit[:, None]
+    by_from[rests, ABOVE, X : Y + 1] = -plane[:-1, 1:][rests] / unit[:, None]
+    by_from[rests, ABOVE, ABOVE] = -above[:-1][rests] / unit
     error[:, HEADING] -= dt * before[:, TURN]
     by_from[:, HEADING, TURN] = -dt
     stops = ~moves & np.append(True, moves[:-1])  # the first state has its own prior

@@ -48,6 +48,8 @@ class TrackProblem:
     """Sigma of the height of the foot above it, meters, shape (n,)."""
     size: BodySize
     noise: MotionNoise
+    ground_follows: bool = False
+    """Whether the ground is known in the frame of the camera, and goes where that goes."""
 
     def select(self, rows: Bools) -> TrackProblem:
         """Return the problem of some of the boxes, by a flag for each (n,)."""
@@ -61,6 +63,40 @@ class TrackProblem:
             plane=self.plane[rows],
             above=self.above[rows],
         )
+
+    def moved(self, motion: Floats) -> TrackProblem:
+        """Return the problem with its cameras moved, each in its own frame [m, rad], (n, 6)."""
+        from scipy.spatial.transform import Rotation
+
+        views = self.views
+        turned = views.rotation @ Rotation.from_rotvec(motion[:, 3:]).as_matrix()
+        position = views.position + np.einsum("nij,nj->ni", views.rotation, motion[:, :3])
+        plane = self.plane
+        if self.ground_follows:
+            turn = turned @ views.rotation.transpose(0, 2, 1)
+            below = views.position.copy()
+            below[:, 2] = plane[:, 0] + np.sum(plane[:, 1:] * below[:, :2], axis=1)
+            below = position + np.einsum("nij,nj->ni", turn, below - views.position)
+            normal = np.einsum("nij,nj->ni", turn, self._normals())
+            slope = -normal[:, :2] / normal[:, 2:]
+            plane = np.column_stack([below[:, 2] - np.sum(slope * below[:, :2], axis=1), slope])
+        return replace(self, views=replace(views, rotation=turned, position=position), plane=plane)
+
+    def rise(self, feet: Floats) -> Floats:
+        """Return how the ground at feet (n, 3) rises with the motions of the cameras, (n, 6).
+
+        Each motion is in the camera's own frame [m, rad].
+        """
+        if not self.ground_follows:
+            return np.zeros((len(feet), 6))
+        normal, turn = self._normals(), self.views.rotation
+        shift = np.einsum("ni,nij->nj", normal, turn)
+        lever = np.cross(feet - self.views.position, normal)
+        return np.concatenate([shift, np.einsum("ni,nij->nj", lever, turn)], axis=1)
+
+    def _normals(self) -> Floats:
+        """Return normals of the ground of each image, 1 along the vertical, (n, 3)."""
+        return np.column_stack([-self.plane[:, 1:], np.ones(len(self.plane))])
 
     def feet(self, state: Floats) -> Floats:
         """Return the feet [m] of states (n, 6), shape (n, 3)."""
@@ -89,6 +125,8 @@ class Equations:
     """Blocks of the states, shape (n, 6, 6)."""
     below: Floats
     """Blocks of each state and the one before it, shape (n - 1, 6, 6)."""
+    of_boxes: Floats
+    """What the boxes add to the diagonal of these blocks of the states, shape (n, 6)."""
     border: Floats
     """Blocks of the states and the size, shape (n, 6, 3)."""
     corner: Floats
@@ -103,6 +141,10 @@ class Equations:
     """Blocks of these motions, shape (n, 6, 6)."""
     gradient_camera: Floats
     """By these motions, shape (n, 6)."""
+    rest_by_state: Floats
+    """Errors of the heights of what rests by the states before and after, shape (n - 1, 12)."""
+    rest_by_camera: Floats
+    """The same by the motions of both cameras, shape (n - 1, 12)."""
     log_density: float
     """What the cost lacks of minus the log density of motion and size: minus this."""
     chi2: Floats
@@ -110,43 +152,64 @@ class Equations:
 
 
 def linearize(
-    problem: TrackProblem, at: Trajectory, moves: Bools, first: Floats
+    problem: TrackProblem,
+    at: Trajectory,
+    moves: Bools,
+    first: Floats,
+    *,
+    information: float = 1.0,
 ) -> Equations | None:
     """Return the normal equations at some states, or None where a box is undefined.
 
     ``moves`` (n - 1,) tells whether the thing moves between images, ``first`` (6,) is the middle
-    of the prior of its first state.
+    of the prior of its first state. ``information`` is what the squared errors of boxes are
+    multiplied by, beside their weights.
     """
     state, count = at.state, len(at.state)
     half = np.exp(at.log_half)
-    seen = predict_boxes(problem.views, problem.feet(state), state[:, HEADING], half)
+    feet = problem.feet(state)
+    rise = problem.rise(feet)
+    seen = predict_boxes(problem.views, feet, state[:, HEADING], half)
     if not (seen.is_whole | (seen.in_front & problem.truncated.any(axis=1))).all():
         return None
     sigma = np.sqrt(problem.variance)
     error = (seen.box - problem.box) / sigma
-    error = np.where(_only_bounds(problem, seen), 0.0, error)
+    is_kept = _only_bounds(problem, seen)
+    error = np.where(is_kept, 0.0, error)
     chi2 = np.sum(error**2, axis=1)
-    weight = (FREEDOM + 4.0) / (FREEDOM + chi2)
-    scale = np.where(error == 0.0, 0.0, np.sqrt(weight)[:, None] / sigma)[:, :, None]
+    weight = information * (FREEDOM + 4.0) / (FREEDOM + chi2)
+    scale = np.where(is_kept, 0.0, np.sqrt(weight)[:, None] / sigma)[:, :, None]
     error = error * np.sqrt(weight)[:, None]
     by_state = np.zeros((count, 4, SIZE))
     slope = problem.plane[:, None, 1:]
     by_state[..., :ABOVE] = seen.by_place[..., :2] + seen.by_place[..., 2:3] * slope
     by_state[..., ABOVE] = seen.by_place[..., 2] * problem.above[:, None]
     by_state[..., HEADING] = seen.by_place[..., 3]
-    by_state, by_size, by_camera = scale * by_state, scale * seen.by_size, scale * seen.by_camera
+    of_camera = seen.by_camera + seen.by_place[..., 2:3] * rise[:, None]
+    by_state, by_size, by_camera = scale * by_state, scale * seen.by_size, scale * of_camera
     transposed = by_state.transpose(0, 2, 1)
     diagonal = transposed @ by_state
+    of_boxes = np.diagonal(diagonal, axis1=1, axis2=2).copy()
     gradient = np.einsum("nij,nj->ni", transposed, error)
-    cost = 0.5 * (FREEDOM + 4.0) * float(np.log1p(chi2 / FREEDOM).sum())
+    cost = 0.5 * information * (FREEDOM + 4.0) * float(np.log1p(chi2 / FREEDOM).sum())
 
     drift = min(FORGOTTEN_AFTER_S**-0.5, MOST_DRIFT / float(np.median(problem.above)))
-    steps = compare_steps(state, np.diff(problem.seconds), moves, problem.noise, drift)
+    seconds, plane, above = np.diff(problem.seconds), problem.plane, problem.above
+    steps = compare_steps(state, seconds, moves, problem.noise, drift, plane, above)
     back, on = steps.by_from.transpose(0, 2, 1), steps.by_to.transpose(0, 2, 1)
     diagonal[:-1] += back @ steps.by_from
     diagonal[1:] += on @ steps.by_to
     gradient[:-1] += np.einsum("nij,nj->ni", back, steps.error)
     gradient[1:] += np.einsum("nij,nj->ni", on, steps.error)
+
+    # Where the ground follows the cameras, the height in the world of what rests does, too.
+    to_rise = np.where(moves, 0.0, steps.by_to[:, ABOVE, ABOVE] / above[1:])[:, None]
+    rest_by_camera = np.concatenate([-to_rise * rise[:-1], to_rise * rise[1:]], axis=1)
+    rest_by_state = np.concatenate([steps.by_from[:, ABOVE], steps.by_to[:, ABOVE]], axis=1)
+    gradient_camera = np.einsum("nij,ni->nj", by_camera, error)
+    pull = rest_by_camera * steps.error[:, ABOVE, None]
+    gradient_camera[:-1] += pull[:, :6]
+    gradient_camera[1:] += pull[:, 6:]
 
     sigmas = first_sigmas(bool(moves[0]), problem.noise)
     middle = first.copy()
@@ -162,13 +225,16 @@ def linearize(
         cost,
         diagonal,
         on @ steps.by_from,
+        of_boxes,
         transposed @ by_size,
         np.einsum("nki,nkj->ij", by_size, by_size) + precision,
         gradient,
         np.einsum("nki,nk->i", by_size, error) + precision @ off_size,
         both @ by_camera,
         by_camera.transpose(0, 2, 1) @ by_camera,
-        np.einsum("nij,ni->nj", by_camera, error),
+        gradient_camera,
+        rest_by_state,
+        rest_by_camera,
         steps.log_density
         - float(np.log(sigmas).sum())
         + 0.5 * float(np.linalg.slogdet(precision)[1]),

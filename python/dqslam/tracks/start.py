@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dqslam._checks import Floats
+from dqslam._checks import Bools, Floats
 from dqslam.tracks.motion import HEADING, SIZE, SPEED, TURN, X, Y
 from dqslam.tracks.problem import TrackProblem, Trajectory
 
@@ -74,7 +74,7 @@ def resting_starts(problem: TrackProblem, places: Floats, weight: Floats) -> lis
     return starts
 
 
-def stopping_start(moving: Trajectory, rests: Floats) -> Trajectory:
+def stopping_start(moving: Trajectory, rests: Bools) -> Trajectory:
     """Start from an estimate that moves all along, at rest in the images that ``rests`` flags (n,).
 
     Each run of such images has their mean state.

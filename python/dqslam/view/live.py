@@ -12,6 +12,7 @@ import numpy as np
 
 from dqslam._checks import Floats
 from dqslam._colors import ESTIMATE, ODOMETRY, TRUTH
+from dqslam.view.live_tracks import LiveTracks
 from dqslam.view.picture import draw_image
 from dqslam.view.scene import Scene, SceneObject, Spread, rgb
 from dqslam.view.surface_mesh import SurfaceMesh
@@ -69,6 +70,9 @@ class _Page:
         parents["cameras"] = self._cameras()
         parents["objects"] = self._objects()
         parents["names"] = self._names()
+        self.tracks = LiveTracks(server, scene.tracks, scene.up) if scene.tracks else None
+        if self.tracks is not None:
+            parents["tracks"] = self.tracks.group
         spreads = [one.spread for one in scene.objects if one.spread is not None]
         if spreads or scene.pose_spreads:
             parents["covariance"] = self._covariances((*spreads, *scene.pose_spreads))
@@ -181,6 +185,8 @@ class _Page:
         placed = _placed(self.scene.estimate[self.frame])
         with self.server.atomic():
             self.camera.position, self.camera.wxyz = placed["position"], placed["wxyz"]
+            if self.tracks is not None:
+                self.tracks.show(self.frame)
             time = f"{self.scene.timestamps[self.frame]:.3f} s"
             picture = draw_image(self.scene, self.frame, self.selected)
             self.picture.content = f'<div style="padding:0 1em">{picture}{time}</div>'
