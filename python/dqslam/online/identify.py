@@ -14,6 +14,7 @@ from dqslam import _core
 from dqslam._checks import Floats, Ints
 from dqslam._ids import ObjectRow
 from dqslam.association import FINAL
+from dqslam.association.appearance import directions, learn_appearance
 from dqslam.association.consistency import (
     find_misfits,
     find_movers,
@@ -75,7 +76,10 @@ class Identifier:
             settings.pose_model, settings.camera, self._path_end[None]
         )
         class_ids = store.class_ids(some.class_name)
-        tracklets = self._linker.link(pose, seen_from[0], some.box, class_ids, some.object_id)
+        looks = directions(some.embedding)
+        tracklets = self._linker.link(
+            pose, seen_from[0], some.box, class_ids[:, None], some.object_id, looks
+        )
         store.add_image(pose, rows, tracklets, free_tracklet=self._linker.started)
         rays = rays_of_boxes(settings.camera, np.repeat(seen_from, len(rows), axis=0), some.box)
         if not self._chooser.choose(tracklets, rays):
@@ -164,6 +168,10 @@ class Identifier:
             labels.left_out |= {row: scattered[row] for row in departed if row in scattered}
         if len(scene.poses) >= MIN_POSES_FOR_NOISE:
             scene.estimate_noise()
+        appearance, _ = learn_appearance(scene.recording.detections)
+        if appearance is not None:
+            self._linker.appearance = appearance
+            self._state.store.labels.appearance = appearance
 
     def _has_departed(self, row: ObjectRow) -> bool:
         """Return whether an object has gone out of view since the last judgment."""
