@@ -66,6 +66,26 @@ def as_floats(name: str, values: ArrayLike, shape: Sequence[int | None]) -> Floa
     return array
 
 
+def as_directions(name: str, values: ArrayLike, count: int) -> Floats:
+    """Return read-only vectors whose direction counts, shape (count, e); none are (count, 0).
+
+    Raises
+    ------
+    ValueError
+        For another number of vectors, and for one that is not finite or has no direction.
+    """
+    given = np.asarray(values)
+    if not given.size:
+        return np.zeros((count, 0))
+    if given.ndim != 2 or len(given) != count:
+        raise ValueError(f"{name}: expected shape ({count}, e), got {given.shape}")
+    if given.dtype.kind == "f":  # a long row is not shown
+        reject_rows(name, ~np.isfinite(given), "not finite")
+    vectors = as_floats(name, given, [count, None])
+    reject_rows(name, (vectors == 0).all(axis=1, keepdims=True), "all zero: it has no direction")
+    return vectors
+
+
 def _as_numbers(name: str, values: ArrayLike) -> Floats:
     """Return a float copy; complex numbers have no order and are refused."""
     try:

@@ -15,7 +15,6 @@ from dqslam.online import Motion, OnlineSlam, StepBoxes, StepError, replay, step
 from dqslam.online.commit import commit
 from dqslam.online.integrated_odometry import IntegratedOdometry
 from dqslam.online.local_map import local_map
-from dqslam.online.look_back import LookBackBudget
 from scenes import CAMERA, Film, Thing, film, orbit_poses, switched_ids, table_things
 from test_association_consistency import circle
 
@@ -275,19 +274,6 @@ def test_integrated_odometry_is_what_thinning_makes_of_its_steps():
     np.testing.assert_allclose(as_given, thin.covariance[0], rtol=1e-9, atol=1e-15)
     levels = 0.02**2 * per_translation + 0.01**2 * per_rotation
     np.testing.assert_allclose(levels, as_given, rtol=1e-9, atol=1e-15)
-
-
-def test_a_look_far_back_is_paid_from_savings():
-    """Windows of 40 keyframes, one earned at each: 100 keyframes back cost two and a half."""
-    budget = LookBackBudget()
-    for _ in range(3):
-        assert budget.next_window(161) == 120
-    assert budget._spend([40, 60], 120, last=160) == 40
-    assert budget._spend([60], 120, last=160) == 120  # nothing is left
-    budget.next_window(161)
-    budget.next_window(161)
-    assert budget._spend([60, 100], 120, last=160) == 100
-    assert budget._spend([], 120, last=160) == 120
 
 
 def test_a_drive_in_the_plane():

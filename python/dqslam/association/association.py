@@ -10,6 +10,7 @@ import numpy as np
 from dqslam import _core
 from dqslam._checks import Bools, Ints, reject_rows, require
 from dqslam._repr import counted
+from dqslam.association.appearance import learn_appearance
 from dqslam.association.attempts import make_map
 from dqslam.association.first_levels import first_levels, look
 from dqslam.association.initiation import MIN_VIEWS
@@ -159,7 +160,10 @@ def associate(
     if not single.all():
         tracker_ids = tracker_ids[single]
         recording = replace(recording, detections=recording.detections.select(single))
-    tracklets = link_tracklets(recording, tracker_ids=tracker_ids)
+    appearance, why_none = None, ""
+    if trust < FINAL:
+        appearance, why_none = learn_appearance(recording.detections)
+    tracklets = link_tracklets(recording, tracker_ids=tracker_ids, appearance=appearance)
     keyframes = choose_keyframes(recording, tracklets)
     used = np.isin(recording.detections.pose, keyframes)
     thin = thin_recording(recording, keyframes)
@@ -171,6 +175,7 @@ def associate(
     def make_scene(raised: float) -> SceneMap:
         labels = Labels.of(thin.detections, tracklets[used])
         labels.make_room(tracklets=int(tracklets.max(initial=-1)) + 1)
+        labels.appearance = appearance
         return SceneMap(
             thin,
             labels,
@@ -199,7 +204,7 @@ def associate(
     left_out = {name: why for name, why in named.items() if name >= 0}
     if trust == FINAL:
         left_out |= not_found(recording, ids, used)
-    remarks += describe_jumps(scene)
+    remarks += describe_jumps(scene) + ([why_none] if why_none else [])
     hidden = _hidden_edges(scene, recording, keyframes, (object_id, ids))
     of_all = (np.cumsum(single) - 1)[counts]
     return Association(
@@ -269,9 +274,7 @@ def _with_all_images(
     """Return the map with the poses and boxes between the keyframes."""
     cut = _cut_alike(tracklets, recording.detections.pose, used, scene.labels.tracklets)
     labels = Labels.of(recording.detections, cut)
-    labels.votes = scene.labels.votes.copy()
-    labels.object_of_tracklet = scene.labels.object_of_tracklet.copy()
-    labels.left_out = dict(scene.labels.left_out)
+    labels.take_objects(scene.labels)
     steps = None
     if scene.step_noise is not None:
         steps = StepNoise.between(recording, np.arange(len(recording.timestamps)))
@@ -296,12 +299,12 @@ def _follow_tracklets(everything: SceneMap) -> None:
     shows which object; the tracklets that go through both keyframes know.
     """
     labels = everything.labels
-    votes = labels.votes.copy()
+    known = labels.since(0)
     owner = labels.object_of_tracklet[labels.tracklets]
     labels.assign(np.arange(len(owner)), owner)
     everything.estimate(max_iterations=FOLLOW_ITERATIONS)
     labels.object_rows[:] = -1
-    labels.votes = votes
+    labels.take_objects(known)
 
 
 def _cut_alike(tracklet: Ints, pose: Ints, used: Bools, cut: Ints) -> Ints:

@@ -67,6 +67,8 @@ def join_duplicates(scene: SceneMap) -> None:
             continue
         if labels.box_counts[kept] == 0 or labels.box_counts[given_up] == 0:
             continue
+        if labels.look_different(kept, given_up):
+            continue
         if _are_seen_together(scene, kept, given_up):  # since one of them was joined with a third
             continue
         spread = _covariance_of_difference(covariance, place[kept], place[given_up])

@@ -206,8 +206,9 @@ def choose(
         scene.cut_edges[rows],
         labels.class_probability(rows, shown),
     )
+    cost = costs.cost - 2 * labels.look_odds(rows, shown)
     own = labels.object_of_tracklet[labels.tracklets[rows]]
     may_switch = (own[:, None] < 0) & np.isfinite(switch_cost)
     stranger = ~may_switch & (own[:, None] != shown)
-    column, margin = assign(np.where(stranger, costs.cost + switch_cost, costs.cost), costs.null)
+    column, margin = assign(np.where(stranger, cost + switch_cost, cost), costs.null)
     return np.where(column >= 0, np.append(shown, -1)[column], -1), margin

@@ -12,7 +12,9 @@ import numpy as np
 from dqslam import _core
 from dqslam._checks import Bools, Floats, Ints
 from dqslam._ids import Tracklet
+from dqslam.association.appearance import CLEARLY_DIFFERENT, Appearance, directions
 from dqslam.association.images import group_by_pose
+from dqslam.association.labels import class_shares
 from dqslam.association.rays import cameras_by_odometry, points_at_depth_one
 from dqslam.metrics import box_iou
 from dqslam.recording import Recording
@@ -25,6 +27,8 @@ MAX_SIDES_AWAY = 1.0
 MAX_GROWTH = 1.6
 # A track that is not seen again within so many images is lost: its prediction is worth nothing.
 MAX_IMAGES_UNSEEN = 5
+# A box may be of another class than the likeliest if that has this probability.
+MIN_CLASS_SHARE = 0.2
 
 
 @dataclass
@@ -32,21 +36,27 @@ class _Track:
     """What is known of a tracklet when the next image comes."""
 
     number: Tracklet
-    class_id: int
+    classes: Ints
+    """Classes that the last box may be of, shape (k,)."""
     tracker_id: int
     """Id that a tracker gave, -1 for none."""
     pose: int
     camera: Floats
     """world_from_camera of that pose by odometry, shape (7,)."""
     box: Floats
+    looks: Floats
+    """Mean of what its boxes look like, shape (e,)."""
     drift: Floats = field(default_factory=lambda: np.zeros(2))
     """Motion of the center per image beside what the camera's turning explains, in pixels."""
+    boxes: int = 1
 
-    def follow(self, pose: int, camera: Floats, box: Floats, predicted: Floats) -> None:
-        """Go on with a box, and learn from where it was predicted."""
-        off = _centers(box) - _centers(predicted)
-        self.drift = self.drift + 0.5 * off / (pose - self.pose)
-        self.pose, self.camera, self.box = pose, camera, box
+    def follow(self, new: _Track, predicted: Floats) -> None:
+        """Go on with a box, that of a new track, and learn from where it was predicted."""
+        off = _centers(new.box) - _centers(predicted)
+        self.drift = self.drift + 0.5 * off / (new.pose - self.pose)
+        self.pose, self.camera, self.box, self.classes = new.pose, new.camera, new.box, new.classes
+        self.boxes += 1
+        self.looks = self.looks + (new.looks - self.looks) / self.boxes
 
 
 class Linker:
@@ -63,9 +73,17 @@ class Linker:
         self._of_id: dict[int, Tracklet] = {}
         self.started = 0
         """Numbers below this are taken."""
+        self.appearance: Appearance | None = None
+        """What looks say; None where they say nothing."""
 
     def link(
-        self, pose: int, camera: Floats, box: Floats, class_id: Ints, tracker_ids: Ints
+        self,
+        pose: int,
+        camera: Floats,
+        box: Floats,
+        classes: Ints,
+        tracker_ids: Ints,
+        looks: Floats,
     ) -> Ints:
         """Return the number of the tracklet of each box of an image, shape (b,).
 
@@ -75,31 +93,54 @@ class Linker:
             Row of the pose, above those before.
         camera
             world_from_camera by odometry, shape (7,).
-        box, class_id
-            Shapes (b, 4) and (b,).
+        box
+            Shape (b, 4).
+        classes
+            Classes that each box may be of, the likeliest first, shape (b, k). It goes on a track
+            of the same class, or of another one of them if there is no other choice.
         tracker_ids
             Ids (b,) that a tracker gave, -1 for none: all boxes of an id are one tracklet.
+        looks
+            What each box looks like, unit vectors (b, e).
         """
         self._tracks = [track for track in self._tracks if pose - track.pose <= MAX_IMAGES_UNSEEN]
         tracklet = np.full(len(box), -1, dtype=np.int64)
         predicted = _predict(self._tracks, pose, camera, self._camera)
-        own = [(track.class_id, track.tracker_id) for track in self._tracks]
-        new = np.column_stack([class_id, tracker_ids])
-        allowed = (np.array(own).reshape(-1, 1, 2) == new).all(axis=2)
-        for i, j in _match(predicted, box, allowed):
-            self._tracks[i].follow(pose, camera, box[j], predicted[i])
+        named, allowed = self._may_go_on(classes, tracker_ids, looks)
+        new = [
+            _Track(Tracklet(-1), classes[j], tracker_id, pose, camera, box[j], looks[j])
+            for j, tracker_id in enumerate(tracker_ids.tolist())
+        ]
+        for i, j in _match(predicted, box, named, allowed):
+            self._tracks[i].follow(new[j], predicted[i])
             tracklet[j] = self._tracks[i].number
         for j in np.flatnonzero(tracklet < 0).tolist():
-            tracker_id = int(tracker_ids[j])
+            tracker_id = new[j].tracker_id
             number = self._of_id.get(tracker_id)
             if number is None:
                 number = Tracklet(self.started)
                 self.started += 1
             if tracker_id >= 0:
                 self._of_id[tracker_id] = number
-            self._tracks.append(_Track(number, int(class_id[j]), tracker_id, pose, camera, box[j]))
-            tracklet[j] = number
+            new[j].number = tracklet[j] = number
+            self._tracks.append(new[j])
         return tracklet
+
+    def _may_go_on(self, classes: Ints, tracker_ids: Ints, looks: Floats) -> tuple[Bools, Bools]:
+        """Return which boxes (b,) of the same class may go on which tracks, (t, b), and of any."""
+        if not self._tracks:
+            none = np.zeros((0, len(classes)), dtype=np.bool_)
+            return none, none
+        own_ids = np.array([track.tracker_id for track in self._tracks])
+        own = np.array([track.classes for track in self._tracks])
+        allowed = own_ids[:, None] == tracker_ids
+        if self.appearance is not None:
+            similarity = np.array([track.looks for track in self._tracks]) @ looks.T
+            allowed &= self.appearance.log_odds(similarity) >= CLEARLY_DIFFERENT
+        named = allowed & (own[:, None, 0] == classes[:, 0])
+        if classes.shape[1] == 1:
+            return named, named
+        return named, allowed & (own[:, None, :, None] == classes[:, None]).any(axis=(2, 3))
 
     def cut(self, tracklet: Tracklet, number: Tracklet) -> None:
         """Go on with a tracklet under another number."""
@@ -111,20 +152,29 @@ class Linker:
                 self._of_id[tracker_id] = number
 
 
-def link_tracklets(recording: Recording, *, tracker_ids: Ints | None = None) -> Ints:
+def link_tracklets(
+    recording: Recording,
+    *,
+    tracker_ids: Ints | None = None,
+    appearance: Appearance | None = None,
+) -> Ints:
     """Return the number of the tracklet of each box, shape (m,), in order of their first boxes.
 
     ``tracker_ids`` (m,) are those that a tracker gave, -1 for none: all boxes of an id are one
-    tracklet.
+    tracklet. ``appearance`` tells what the vectors of boxes say, by default nothing.
     """
     detections = recording.detections
     cameras = cameras_by_odometry(recording)
     ids = np.full(len(detections), -1) if tracker_ids is None else tracker_ids
     tracklet = np.full(len(detections), -1, dtype=np.int64)
     linker = Linker(recording.camera)
+    linker.appearance = appearance
+    looks = directions(detections.embedding)
+    possible, shares = class_shares(detections)
+    classes = np.where(shares >= MIN_CLASS_SHARE, possible, possible[:, :1])
     for pose, rows in group_by_pose(detections.pose):
         tracklet[rows] = linker.link(
-            pose, cameras[pose], detections.box[rows], detections.class_id[rows], ids[rows]
+            pose, cameras[pose], detections.box[rows], classes[rows], ids[rows], looks[rows]
         )
     return np.asarray(np.unique(tracklet, return_inverse=True)[1])
 
@@ -153,13 +203,16 @@ def _predict(tracks: list[_Track], pose: int, seen_from: Floats, camera: _core.C
     return np.asarray(box + np.tile(shift, (1, 2)))
 
 
-def _match(predicted: Floats, box: Floats, allowed: Bools) -> list[tuple[int, int]]:
-    """Pair tracks (t, 4) with boxes (b, 4) where ``allowed`` (t, b): by overlap, then the rest."""
+def _match(predicted: Floats, box: Floats, named: Bools, allowed: Bools) -> list[tuple[int, int]]:
+    """Pair tracks (t, 4) with boxes (b, 4): by overlap where ``named`` (t, b), then the rest.
+
+    The rest are pairs that are ``allowed`` (t, b), where neither has another choice around.
+    """
     from scipy.optimize import linear_sum_assignment
 
     if not len(predicted) or not len(box):
         return []
-    overlap = np.where(allowed, box_iou(predicted[:, None], box), 0.0)
+    overlap = np.where(named, box_iou(predicted[:, None], box), 0.0)
     rows, columns = linear_sum_assignment(-overlap)
     pairs = [
         (i, j)

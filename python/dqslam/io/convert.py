@@ -16,6 +16,7 @@ from dqslam.io.camera import CAMERA_FORMATS
 from dqslam.io.camera.rosbag import KIND as CAMERA_INFO
 from dqslam.io.colmap_model import write_colmap_model
 from dqslam.io.detections import DETECTION_FORMATS, DetectionTable
+from dqslam.io.detections.embeddings import embeddings_path
 from dqslam.io.detections.rosbag import KIND as DETECTION_ARRAY
 from dqslam.io.files import FileError, refuse_inputs, whole_folder
 from dqslam.io.formats import (
@@ -109,7 +110,7 @@ def convert(
         return _convert_results(source, out, to, context)
     if out.exists() and source.exists() and out.samefile(source):
         raise ValueError(f"{out}: the file would be written over itself")
-    for file in (out, _frames_file(out)):
+    for file in (out, _frames_file(out), *([] if out == STDOUT else [embeddings_path(out)])):
         refuse_inputs(file, [*_files_of(source), *context.files])
     kind = _kind(source, format, to)
     if kind is not None:
@@ -158,8 +159,10 @@ def _convert_results(
 
 
 def _files_of(source: Path) -> list[Path]:
-    """Return a source, and what is in it if it is a folder."""
-    return [source, *(source.iterdir() if source.is_dir() else ())]
+    """Return a source, and what is in it if it is a folder, or else is read with it."""
+    if source.is_dir():
+        return [source, *source.iterdir()]
+    return [source] if is_stdin(source) else [source, embeddings_path(source)]
 
 
 def _part_progress(progress: Progress, done: int, parts: int, share: float) -> None:
@@ -286,8 +289,18 @@ def _write_detections(
             raise ValueError(f"{out}: yolo's boxes are shares of the image: give it with --camera")
         options |= dict(zip(("width", "height"), size, strict=True))
     target.write(out, table, **options)
-    written = [Written(out, f"{len(table)} boxes as {target.name}", target.loses)]
+    written = [Written(out, f"{len(table)} boxes as {target.name}", _loses(out, table, target))]
     return written + (_beside(out, target, table.frame, table.timestamp) if times else [])
+
+
+def _loses(out: Path, table: DetectionTable, target: Format[Any]) -> tuple[str, ...]:
+    """Return what a format of boxes, or a file without files beside it, has no place for."""
+    loses = target.loses
+    if table.others is not None and target.name != "csv":
+        loses += ("other classes of boxes",)
+    if table.embedding is not None and (target.name != "csv" or out == STDOUT):
+        loses += ("what boxes look like",)
+    return loses
 
 
 def _beside(out: Path, target: Format[Any], frames: ArrayLike, times: ArrayLike) -> list[Written]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -185,6 +185,7 @@ def load_recording(
     if not rows.size:
         raise FileError(detections, _nothing_left(table, dropped, ids, tolerance, times))
     classes = dict(zip(table.class_id.tolist(), table.class_name, strict=True))
+    classes = (dict(table.others.class_names) if table.others is not None else {}) | classes
     recording = Recording(
         camera=lens,
         timestamps=times,
@@ -196,9 +197,21 @@ def load_recording(
             class_id=table.class_id[rows],
             object_id=object_id[rows],
             class_names={number: name or str(number) for number, name in classes.items()},
+            **_more_of_boxes(table, rows),
         ),
     )
     return (extras or Extras()).added_to(recording, tolerance, whole.timestamps), dropped
+
+
+def _more_of_boxes(table: DetectionTable, rows: NDArray[np.int64]) -> dict[str, Any]:
+    """Return the fields of detections that only some files have."""
+    fields: dict[str, Any] = {}
+    if table.others is not None:
+        others = table.others.select(rows)
+        fields |= {"other_class_id": others.class_id, "other_score": others.score}
+    if table.embedding is not None:
+        fields["embedding"] = table.embedding[rows]
+    return fields
 
 
 def _scored(table: DetectionTable, box: NDArray[np.float64], min_score: float) -> NDArray[np.bool_]:

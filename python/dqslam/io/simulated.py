@@ -14,6 +14,7 @@ from dqslam._checks import Floats
 from dqslam._outputs import added_files, output_set
 from dqslam.io.camera.table import write_json_camera
 from dqslam.io.detections.csv import COLUMNS, write_csv
+from dqslam.io.detections.other_classes import OtherClasses
 from dqslam.io.detections.table import DetectionTable
 from dqslam.io.files import write_text
 from dqslam.io.step_covariances import write_step_covariances
@@ -51,6 +52,7 @@ def write_recording(recording: Recording, directory: Path) -> None:
     write_json_camera(directory / "camera.json", recording.camera)
     _write_path(directory / "odometry.txt", recording, odometry.pose_model, path)
     write_step_covariances(directory / "odometry_covariance.csv", recording)
+    others = OtherClasses(boxes.other_class_id, boxes.other_score, boxes.class_names)
     table = DetectionTable(
         path=str(directory / "boxes.csv"),
         columns=(*COLUMNS, "track_id"),
@@ -62,6 +64,8 @@ def write_recording(recording: Recording, directory: Path) -> None:
         class_id=boxes.class_id,
         class_name=tuple(boxes.class_names[number] for number in boxes.class_id.tolist()),
         track_id=boxes.object_id,
+        others=others if boxes.other_class_id.shape[1] else None,
+        embedding=boxes.embedding if boxes.embedding.shape[1] else None,
     )
     write_csv(directory / "boxes.csv", table)
 

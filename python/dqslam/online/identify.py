@@ -8,12 +8,16 @@ from them. ``SceneMap`` and ``Follower`` do this here as they do there, on a par
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 
 from dqslam import _core
 from dqslam._checks import Floats, Ints
 from dqslam._ids import ObjectRow
 from dqslam.association import FINAL
+from dqslam.association.appearance import directions, learn_appearance
 from dqslam.association.consistency import (
     find_misfits,
     find_movers,
@@ -39,8 +43,11 @@ SMOOTHED_KEYFRAMES = 10
 SMOOTHING_ITERATIONS = 2
 # The boxes of a keyframe are assigned again when there are so many newer ones: more is known then.
 KEYFRAMES_UNTIL_REASSIGNED = 10
-# Noise, sizes, duplicates and movers are looked at each time there are so many new keyframes.
+# Duplicates, sizes, movers and noise are looked at each time there are so many new keyframes, one
+# of them at each keyframe ...
 KEYFRAMES_PER_JUDGMENT = 5
+# ... and so many objects, whether they moved: each takes an estimate of the window.
+SUSPECTS_AT_A_TIME = 2
 # An object is out of view after so many keyframes without a box: it is asked whether it moved.
 KEYFRAMES_UNTIL_DEPARTED = 3
 
@@ -56,6 +63,8 @@ class Identifier:
         self._budget = LookBackBudget()
         self._follower = Follower(trust=state.settings.trust)
         self._misfits: set[ObjectRow] = set()
+        self._judgments: list[Callable[[LocalMap], None]] = []  # one at each of the next keyframes
+        self._judged_keyframes = 0  # how many there were when departed objects were judged
         self._odometry = IntegratedOdometry.of_no_steps(state.settings.pose_model)
         self._path_end = self._odometry.relative  # by odometry, from where this began
 
@@ -75,7 +84,10 @@ class Identifier:
             settings.pose_model, settings.camera, self._path_end[None]
         )
         class_ids = store.class_ids(some.class_name)
-        tracklets = self._linker.link(pose, seen_from[0], some.box, class_ids, some.object_id)
+        looks = directions(some.embedding)
+        tracklets = self._linker.link(
+            pose, seen_from[0], some.box, class_ids[:, None], some.object_id, looks
+        )
         store.add_image(pose, rows, tracklets, free_tracklet=self._linker.started)
         rays = rays_of_boxes(settings.camera, np.repeat(seen_from, len(rows), axis=0), some.box)
         if not self._chooser.choose(tracklets, rays):
@@ -88,13 +100,14 @@ class Identifier:
         return store.labels.object_rows[-len(rows) :]
 
     def _identify_keyframe(self) -> None:
-        """Find the objects of the last keyframe's boxes, start new ones, and judge all."""
+        """Find the objects of the last keyframe's boxes, start new ones, and judge some."""
         state, store = self._state, self._state.store
         local = local_map(state, self._budget.next_window(len(store.keyframes)))
         self._assign(local)
         begin = self._budget.for_strangers(local, store)
         self._commit(local)
-        if begin < local.begin:
+        looks_back = begin < local.begin
+        if looks_back:
             local = local_map(state, begin)
             self._assign(local, strangers_only=True)
             self._commit(local)
@@ -106,13 +119,11 @@ class Identifier:
         local.scene.ellipsoids = state.core.ellipsoids
         self._follower.initiate_objects(local.scene)
         self._reassign_older(local)
-        if len(store.keyframes) % KEYFRAMES_PER_JUDGMENT == 0:
-            begin = self._budget.for_duplicates(local, store)
-            if begin < local.begin:
-                self._commit(local)
-                local = local_map(state, begin)
-            self._judge(local)
         self._commit(local)
+        if len(store.keyframes) % KEYFRAMES_PER_JUDGMENT == 0 and not self._judgments:
+            self._judgments = [self._join, self._judge_sizes, self._judge_noise]
+        if self._judgments and not looks_back:  # which is work enough
+            self._judgments.pop(0)(local)
 
     def _assign(self, local: LocalMap, *, strangers_only: bool = False) -> None:
         """Give boxes of the last keyframe to objects, its pose being that of odometry."""
@@ -144,31 +155,60 @@ class Identifier:
         tracklets, own = labels.tracklets[rows], labels.object_of_tracklet
         own[tracklets] = np.where(own[tracklets] < 0, found, own[tracklets])
 
-    def _judge(self, local: LocalMap) -> None:
-        """Look at the level of the noise, and at objects that are one, or move."""
-        scene, labels = local.scene, local.scene.labels
-        near = labels.shown_objects
-        scene.learn_size(near)
-        final = self._state.settings.trust == FINAL
-        if not final:
-            join_duplicates(scene)
-        # Sizes are looked at again; what has moved has moved.
+    def _join(self, local: LocalMap) -> None:
+        """Join objects that are one, looking back if one of them was seen long ago."""
+        if self._state.settings.trust == FINAL:
+            return
+        local.scene.learn_size(local.scene.labels.shown_objects)
+        begin = self._budget.for_duplicates(local, self._state.store)
+        if begin < local.begin:
+            local = local_map(self._state, begin)
+        join_duplicates(local.scene)
+        self._commit(local)
+
+    def _judge_sizes(self, local: LocalMap) -> None:
+        """Leave out objects of unusual size; those that have departed are asked whether they moved.
+
+        Sizes are looked at again; what has moved has moved.
+        """
+        labels = local.scene.labels
+        local.scene.learn_size(labels.shown_objects)
         stays = {row: why for row, why in labels.left_out.items() if row not in self._misfits}
-        misfits = find_misfits(scene)
+        misfits = find_misfits(local.scene)
         self._misfits = set(misfits)
         labels.left_out = misfits | stays
-        departed = [row for row in near.tolist() if self._has_departed(row)]
-        labels.left_out |= find_movers(scene, departed)
-        if final:
+        self._commit(local)
+        departed = [row for row in labels.shown_objects.tolist() if self._has_departed(row)]
+        self._judged_keyframes = len(self._state.store.keyframes)
+        for first in range(0, len(departed), SUSPECTS_AT_A_TIME):
+            some = departed[first : first + SUSPECTS_AT_A_TIME]
+            self._judgments.append(partial(self._judge_motion, some))
+
+    def _judge_motion(self, suspects: list[ObjectRow], local: LocalMap) -> None:
+        """Leave out those of some objects that have moved, or whose ids name several things."""
+        scene, labels = local.scene, local.scene.labels
+        labels.left_out = labels.left_out | find_movers(scene, suspects)
+        if self._state.settings.trust == FINAL:
             scattered = find_scattered(scene)
-            labels.left_out |= {row: scattered[row] for row in departed if row in scattered}
+            labels.left_out |= {row: scattered[row] for row in suspects if row in scattered}
+        self._commit(local)
+
+    def _judge_noise(self, local: LocalMap) -> None:
+        """Correct the level of the odometry's noise, and learn what looks say."""
+        scene = local.scene
         if len(scene.poses) >= MIN_POSES_FOR_NOISE:
             scene.estimate_noise()
+            self._commit(local)
+        appearance, _ = learn_appearance(scene.recording.detections)
+        if appearance is not None:
+            self._linker.appearance = appearance
+            self._state.store.labels.appearance = appearance
 
     def _has_departed(self, row: ObjectRow) -> bool:
-        """Return whether an object has gone out of view since the last judgment."""
+        """Return whether an object has gone out of view since such objects were judged."""
         store = self._state.store
         seen = store.keyframes_of(row)
-        absent = len(store.keyframes) - 1 - seen[-1] if len(seen) else 0
-        first = KEYFRAMES_UNTIL_DEPARTED
-        return bool(first <= absent < first + KEYFRAMES_PER_JUDGMENT)
+        if not len(seen):
+            return False
+        first = int(seen[-1]) + KEYFRAMES_UNTIL_DEPARTED  # the keyframe at which it counts as gone
+        return self._judged_keyframes <= first < len(store.keyframes)

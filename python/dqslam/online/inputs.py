@@ -15,6 +15,7 @@ from dqslam._checks import (
     Floats,
     Ints,
     as_covariances,
+    as_directions,
     as_floats,
     reject_large,
     reject_rows,
@@ -148,20 +149,32 @@ class CheckedBoxes:
     object_id: Ints
     class_name: Sequence[str]
     truncated: Bools
+    embedding: Floats
 
     def select(self, rows: Ints) -> CheckedBoxes:
         """Return some of the boxes."""
         names = [self.class_name[row] for row in rows.tolist()]
-        return CheckedBoxes(self.box[rows], self.object_id[rows], names, self.truncated[rows])
+        return CheckedBoxes(
+            self.box[rows], self.object_id[rows], names, self.truncated[rows], self.embedding[rows]
+        )
 
 
 _NO_BOXES = CheckedBoxes(
-    np.zeros((0, 4)), np.zeros(0, dtype=np.int64), (), np.zeros((0, 4), dtype=np.bool_)
+    np.zeros((0, 4)),
+    np.zeros(0, dtype=np.int64),
+    (),
+    np.zeros((0, 4), dtype=np.bool_),
+    np.zeros((0, 0)),
 )
 
 
-def check_boxes(boxes: StepBoxes | None, camera: _core.Camera) -> CheckedBoxes:
-    """Return the boxes as arrays; ValueError names what does not fit, and its row."""
+def check_boxes(
+    boxes: StepBoxes | None, camera: _core.Camera, embedding_size: int | None = None
+) -> CheckedBoxes:
+    """Return the boxes as arrays; ValueError names what does not fit, and its row.
+
+    ``embedding_size`` is how long the vectors of boxes are, by default anything.
+    """
     if boxes is None:
         return _NO_BOXES
     box = _as_numbers("boxes", boxes.box)
@@ -190,7 +203,13 @@ def check_boxes(boxes: StepBoxes | None, camera: _core.Camera) -> CheckedBoxes:
         raise ValueError(f"truncated: expected shape ({count}, 4), got {truncated.shape}")
     if truncated.dtype != np.bool_:
         reject_rows("truncated", ~np.isin(truncated, [0, 1]), "not true or false", truncated)
-    return CheckedBoxes(box, object_id.astype(np.int64), names, truncated.astype(np.bool_))
+    embedding = as_directions("embedding", boxes.embedding, count)
+    length = embedding.shape[1]
+    if embedding_size not in (None, length):
+        raise ValueError(f"embedding: {length} numbers a box, and {embedding_size} before")
+    return CheckedBoxes(
+        box, object_id.astype(np.int64), names, truncated.astype(np.bool_), embedding
+    )
 
 
 def _check_numbers(box: Floats, camera: _core.Camera) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 
 from dqslam._checks import Floats, Ints
 from dqslam._ids import ObjectId, ObjectRow
+from dqslam.association.appearance import directions
 from dqslam.association.labels import Labels
 from dqslam.assumptions import OdometryNoise, SizePrior, SizePriors
 from dqslam.online.inputs import CheckedBoxes
@@ -71,7 +72,8 @@ class KeyframeStore:
         self.box_keyframe = np.append(self.box_keyframe, number)
         self.observation_rows = np.append(self.observation_rows, observation_rows)
         self.tracker_ids = np.append(self.tracker_ids, keyframe.boxes.object_id)
-        self.labels.add_boxes(tracklets, self.class_ids(keyframe.boxes.class_name))
+        classes = self.class_ids(keyframe.boxes.class_name)
+        self.labels.add_boxes(tracklets, classes, directions(keyframe.boxes.embedding))
         self.keyframes.append(keyframe)
 
     def class_ids(self, names: Sequence[str]) -> Ints:
@@ -102,7 +104,8 @@ class KeyframeStore:
     def votes(self, row: ObjectRow) -> Counter[str]:
         """Return how often an object was called what."""
         votes = self.labels.votes[row].tolist() if row < len(self.labels.votes) else []
-        return Counter({name: n for name, n in zip(self._class_ids, votes, strict=False) if n})
+        counts = [round(n) for n in votes]  # of one class each: they are whole
+        return Counter({name: n for name, n in zip(self._class_ids, counts, strict=False) if n})
 
     def add_map_object(self, row: ObjectRow, class_name: str, covariance: Floats) -> None:
         """Add an object of a map, that is called its class once, and its covariance (9, 9)."""

@@ -69,4 +69,5 @@ def _detections(store: KeyframeStore, begin: int, labels: Labels) -> Detections:
         object_id=np.full(sum(count), -1),
         class_names=store.class_names,
         truncated=np.concatenate([one.truncated for one in boxes]),
+        embedding=np.concatenate([one.embedding for one in boxes]),
     )

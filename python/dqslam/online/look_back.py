@@ -2,7 +2,8 @@
 
 The covariance of where something was seen long ago, as seen from here, is that of the path
 between: work as large as the loop. So much is looked at all the time; more is paid from what has
-been saved, which keeps the work of a keyframe bounded in the mean.
+been saved, which keeps the work of a keyframe bounded in the mean. A few looks at the whole
+path are the most that is saved, so that long looks do not follow one after the other for long.
 """
 
 from __future__ import annotations
@@ -19,6 +20,8 @@ from dqslam.online.local_map import LocalMap
 WINDOW_KEYFRAMES = 40
 # Each keyframe saves so many windows for looks further back: as much work again, now or later.
 WINDOWS_SAVED_PER_KEYFRAME = 1.0
+# At most so many looks at the whole path are saved.
+MOST_LOOKS_SAVED = 4.0
 # So many boxes determine where an object is: if the window has fewer, its last ones are looked at.
 BOXES_THAT_PLACE = 8
 # Objects are expected this far outside of the image, as a part of its size: the path may be off.
@@ -35,7 +38,8 @@ class LookBackBudget:
 
     def next_window(self, keyframes: int) -> int:
         """Save for one more keyframe; return the first that is always looked at."""
-        self._saved += WINDOWS_SAVED_PER_KEYFRAME
+        most = MOST_LOOKS_SAVED * max(keyframes / WINDOW_KEYFRAMES, 1.0)
+        self._saved = min(self._saved + WINDOWS_SAVED_PER_KEYFRAME, most)
         return max(keyframes - 1 - WINDOW_KEYFRAMES, 0)
 
     def for_strangers(self, local: LocalMap, store: KeyframeStore) -> int:
@@ -60,14 +64,17 @@ class LookBackBudget:
     def for_duplicates(self, local: LocalMap, store: KeyframeStore) -> int:
         """Return the first keyframe to look at for objects that may be older ones."""
         near = set(local.scene.labels.shown_objects.tolist())
-        anchors = []
+        asked: dict[tuple[ObjectRow, ObjectRow], tuple[int, int]] = {}  # anchor and boxes
         for pair in close_pairs(local.scene):
             boxes = min(len(store.keyframes_of(row)) for row in pair)
             one_is_near = len(near.intersection(pair)) == 1
             if one_is_near and boxes >= max(BOXES_THAT_PLACE, 2 * self._asked.get(pair, 0)):
-                self._asked[pair] = boxes
-                anchors.append(min(_anchor(store, row) for row in pair))
-        return self._spend(anchors, local.begin, len(store.keyframes) - 1)
+                asked[pair] = (min(_anchor(store, row) for row in pair), boxes)
+        anchors = [anchor for anchor, _ in asked.values()]
+        reached = self._spend(anchors, local.begin, len(store.keyframes) - 1)
+        # What the savings do not reach is asked again when they do.
+        self._asked |= {pair: boxes for pair, (at, boxes) in asked.items() if at >= reached}
+        return reached
 
     def _spend(self, anchors: list[int], begin: int, last: int) -> int:
         """Return the earliest of some keyframes that the savings reach, and pay for it."""

@@ -44,6 +44,7 @@ def steps_of(recording: Recording) -> Iterator[Step]:
                 object_id=detections.object_id[rows],
                 class_name=[names[row] for row in rows],
                 truncated=detections.truncated[rows],
+                embedding=detections.embedding[rows],
             ),
             positions=_positions_at(recording.positions, pose),
             measurements=_measurements_at(recording.measurements, pose),

@@ -56,6 +56,8 @@ class State:
     """The object that each box shows, for boxes that are tested."""
     odometry_end: Floats
     """Where odometry alone leads, shape (d,)."""
+    embedding_size: int | None = None
+    """How long the vectors of what boxes look like are, None before the first boxes."""
     timestamps: list[float] = field(default_factory=list)
     given_ids: list[Ints] = field(default_factory=list)
     """Given ids of the boxes of each step, -1 for none."""

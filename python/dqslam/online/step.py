@@ -34,6 +34,9 @@ class StepBoxes:
     """Class of each box; "object" by default."""
     truncated: ArrayLike | None = None
     """Whether each edge is cut by the image border, shape (b, 4); by default none is."""
+    embedding: ArrayLike = ()
+    """What each box looks like, as a vector whose direction counts, shape (b, e); by default e is
+    0. All boxes of a session have vectors of one length, or none has."""
 
 
 @dataclass(frozen=True, eq=False)

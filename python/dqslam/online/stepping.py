@@ -96,7 +96,7 @@ def check_step(
             time=next_time(state.timestamps[-1] if count else None, timestamp),
             relative=relative,
             covariance=covariance,
-            boxes=check_boxes(boxes, settings.camera),
+            boxes=check_boxes(boxes, settings.camera, state.embedding_size),
             positions=positions,
             measurements=measurements,
         )
@@ -128,6 +128,8 @@ def _take_step(
     registry.register(prepared.new)
     for row, name in zip(prepared.rows, prepared.names, strict=True):
         registry.votes[row][name] += 1
+    if len(step.boxes.box):
+        state.embedding_size = step.boxes.embedding.shape[1]
     state.timestamps.append(step.time)
     state.given_ids.append(step.boxes.object_id)
     state.shown = step.boxes.object_id

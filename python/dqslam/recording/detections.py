@@ -5,12 +5,13 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from dqslam._checks import (
     Bools,
     Floats,
     Ints,
+    as_directions,
     as_floats,
     as_ints,
     assign,
@@ -46,6 +47,14 @@ class Detections:
     truncated: Bools = field(default_factory=lambda: np.zeros((0, 4), dtype=np.bool_))
     """Whether the object may go on beyond each edge, which the border of the image or something
     nearer cuts, shape (m, 4); by default none is."""
+    other_class_id: Ints = field(default_factory=lambda: np.zeros((0, 0), dtype=np.int64))
+    """Other classes that the detector thinks possible, -1 for none, shape (m, k); by default k is
+    0."""
+    other_score: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+    """Confidence in each of them, from 0, shape (m, k)."""
+    embedding: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+    """What each box looks like, as a vector whose direction counts, shape (m, e); by default e is
+    0."""
 
     def __post_init__(self) -> None:
         """Check shapes and numbers."""
@@ -67,7 +76,9 @@ class Detections:
             class_id=class_id,
             object_id=object_id,
             truncated=_as_edges("detections.truncated", self.truncated, count),
+            embedding=as_directions("detections.embedding", self.embedding, count),
         )
+        self._check_other_classes(count)
 
     @classmethod
     def from_xyxy(
@@ -79,6 +90,9 @@ class Detections:
         class_id: ArrayLike | None = None,
         class_names: Mapping[int, str] | Sequence[str] | None = None,
         score: ArrayLike | None = None,
+        other_class_id: ArrayLike | None = None,
+        other_score: ArrayLike | None = None,
+        embedding: ArrayLike | None = None,
         camera: Camera | None = None,
     ) -> Self:
         """Make detections from corners in pixels that are counted from the corner of the image.
@@ -99,6 +113,11 @@ class Detections:
             number is the name. Without both, all boxes are of the class "object".
         score
             Confidence of the detector, shape (m,), by default 1.
+        other_class_id, other_score
+            Other classes that the detector thinks possible, -1 for none, and its confidence in each
+            of them, shapes (m, k).
+        embedding
+            What each box looks like, as a vector whose direction counts, shape (m, e).
         camera
             If given, boxes are in distorted pixels of this camera and are undistorted.
 
@@ -119,7 +138,9 @@ class Detections:
             numbers = as_ints("class_id", _each(class_id, count), count)
         if class_names is None:
             unnamed = class_id is None
-            names = {i: "object" if unnamed else str(i) for i in np.unique(numbers).tolist()}
+            others = [] if other_class_id is None else np.asarray(other_class_id).ravel().tolist()
+            known = {*numbers.tolist(), *(one for one in others if one >= 0)}
+            names = {i: "object" if unnamed else str(i) for i in sorted(known)}
         elif isinstance(class_names, Mapping):
             names = dict(class_names)
         else:
@@ -133,6 +154,9 @@ class Detections:
                 "object_id", _each(-1 if object_id is None else object_id, count), count
             ),
             class_names=names,
+            other_class_id=_table(other_class_id, np.int64),
+            other_score=_table(other_score, np.float64),
+            embedding=_table(embedding, np.float64),
         )
 
     @classmethod
@@ -198,8 +222,32 @@ class Detections:
 
     def select(self, rows: Ints | Bools) -> Self:
         """Return some of the boxes: their rows, or a flag for each box (m,)."""
-        names = ("pose", "box", "score", "class_id", "object_id", "truncated")
+        names = ["pose", "box", "score", "class_id", "object_id", "truncated"]
+        names += ["other_class_id", "other_score", "embedding"]
         return replace(self, **{name: getattr(self, name)[rows] for name in names})
+
+    def _check_other_classes(self, count: int) -> None:
+        """Check and set the other classes of boxes and their scores."""
+        given = np.asarray(self.other_class_id)
+        shape = given.shape if given.size else (count, 0)
+        if len(shape) != 2 or shape[0] != count:
+            raise ValueError(
+                f"detections.other_class_id: expected shape ({count}, k), got {given.shape}"
+            )
+        numbers = np.zeros(shape, dtype=np.int64)
+        for column, values in enumerate(given.T if shape[1] else ()):
+            numbers[:, column] = as_ints("detections.other_class_id", values, count)
+        wrong = (numbers != -1) & ~np.isin(numbers, list(self.class_names))
+        reject_rows("detections.other_class_id", wrong, "class has no name", numbers)
+        twice = (numbers != -1) & (numbers == self.class_id[:, None])
+        reject_rows("detections.other_class_id", twice, "the class of the box again", numbers)
+        score = as_floats("detections.other_score", self.other_score, [None, None])
+        if not score.size and not shape[1]:
+            score = np.zeros(shape)
+        if score.shape != shape:
+            raise ValueError(f"detections.other_score: expected shape {shape}, got {score.shape}")
+        reject_rows("detections.other_score", score < 0, "negative", score)
+        assign(self, other_class_id=numbers, other_score=score)
 
 
 def in_words(boxes: Detections) -> str:
@@ -218,6 +266,11 @@ def in_words(boxes: Detections) -> str:
 def _each(values: ArrayLike, count: int) -> ArrayLike:
     """Repeat a single number for each of the rows."""
     return np.full(count, values) if np.ndim(values) == 0 else values
+
+
+def _table(values: ArrayLike | None, kind: type) -> NDArray[Any]:
+    """Return a table of numbers (m, k), by default an empty one."""
+    return np.zeros((0, 0), dtype=kind) if values is None else np.asarray(values)
 
 
 def _as_edges(name: str, values: ArrayLike, count: int) -> Bools:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from dqslam._checks import Floats
+from dqslam.io.detections.other_classes import NUMBERED
 from dqslam.io.files import FileError
 from dqslam.io.notes import Notes
 
@@ -34,6 +35,7 @@ SPELLINGS: dict[str, tuple[str, ...]] = {
 MEANING = {spelling: name for name, all_of in SPELLINGS.items() for spelling in all_of}
 # An index of pandas has no name. The others repeat what the box says, or belong to our results.
 SILENT = {"", "unnamed_0", "index", "area"}
+FIRST_OTHER = 2  #: number at the end of the columns of the second class of a box
 CORNERS = ("x1", "y1", "x2", "y2")
 SIZES = ("x1", "y1", "width", "height")
 CENTERS = ("cx", "cy", "width", "height")
@@ -72,6 +74,14 @@ def counted_from_corner(names: Iterable[str]) -> bool:
     return not set(names) <= set(CORNERS)
 
 
+def _numbered(key: str) -> str | None:
+    """Return the meaning of a column of another class of the boxes, such as ``class_id_2``."""
+    name, _, number = key.rpartition("_")
+    meaning = MEANING.get(name)
+    another = number.isdecimal() and int(number) >= FIRST_OTHER
+    return f"{meaning}_{int(number)}" if another and meaning in NUMBERED else None
+
+
 def plain(name: str) -> str:
     """Return a name in lower case with "_" for spaces, points and signs."""
     return re.sub(r"[^a-z0-9]+", "_", name.strip().lower()).strip("_")
@@ -94,7 +104,7 @@ def known_columns(
     unknown = []
     for name in names:
         key = plain(name)
-        meaning = MEANING.get(key)
+        meaning = MEANING.get(key) or _numbered(key)
         if meaning is None:
             if key not in SILENT:
                 unknown.append(name)

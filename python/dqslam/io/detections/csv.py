@@ -8,7 +8,8 @@ subtracted. The corners are needed, and one of
 ``frame``, ``timestamp`` and ``image``; boxes of one ``timestamp`` are of one image if there is
 nothing else. An empty score is 1, because trackers give none. An empty ``track_id`` or -1 means
 that the box has no object. Rows may be in any order, but later frames have later times.
-# starts a comment line.
+# starts a comment line. Further classes are in ``class_id_2``, ``class_name_2``, ``score_2`` and so
+on, see `other_classes`; what boxes look like is in a ``.npy`` beside the file, see `embeddings`.
 """
 
 from __future__ import annotations
@@ -21,10 +22,12 @@ from pathlib import Path
 import numpy as np
 
 from dqslam._checks import Floats
+from dqslam._input import is_stream
 from dqslam.io.csv_table import CsvTable, delimiter_of
 from dqslam.io.csv_table import read_csv as read_table
 from dqslam.io.detections.columns import (
     CORNERS,
+    FIRST_OTHER,
     MEANING,
     corners_of,
     counted_from_corner,
@@ -32,6 +35,8 @@ from dqslam.io.detections.columns import (
     known_columns,
     plain,
 )
+from dqslam.io.detections.embeddings import read_embeddings, write_embeddings
+from dqslam.io.detections.other_classes import NUMBERED, OtherClasses, class_columns
 from dqslam.io.detections.records import Records, make_table
 from dqslam.io.detections.table import NO_SCORE, DetectionTable
 from dqslam.io.files import FileError, parse_floats, write_text
@@ -70,6 +75,10 @@ def read_csv(path: str | Path, context: ReadContext) -> DetectionTable:
         class_id=labels("class_id"),
         class_name=labels("class_name"),
         track_id=labels("track_id"),
+        others=class_columns(
+            path, names, labels, lambda name: _floats(cells, names[name]), cells.header
+        ),
+        embedding=read_embeddings(path, cells.lines),
         image_size=_image_size(cells, names) if edges == CORNERS else None,
     )
     return make_table(path, "csv", records, context)
@@ -113,11 +122,16 @@ def has_times(path: Path) -> bool:
 
 
 def write_csv(path: str | Path, table: DetectionTable) -> None:
-    """Write boxes to a millionth of a pixel, and times and scores without loss of a bit."""
+    """Write boxes and scores to a millionth, and times without loss of a bit.
+
+    What boxes look like goes into a ``.npy`` beside the file; standard output has none.
+    """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     tracks = () if table.track_id is None else ("track_id",)
-    writer.writerow((*COLUMNS, *tracks))
+    others = 0 if table.others is None else table.others.class_id.shape[1]
+    more = [f"{name}_{FIRST_OTHER + k}" for k in range(others) for name in NUMBERED]
+    writer.writerow((*COLUMNS, *tracks, *more))
     columns = [
         table.frame.tolist(),
         map(repr, table.timestamp.tolist()),
@@ -126,9 +140,23 @@ def write_csv(path: str | Path, table: DetectionTable) -> None:
         table.class_id.tolist(),
         table.class_name,
         *([] if table.track_id is None else [table.track_id.tolist()]),
+        *([] if table.others is None else _other_columns(table.others)),
     ]
     writer.writerows(zip(*columns, strict=True))
     write_text(path, text.getvalue())
+    if table.embedding is not None and not is_stream(path):
+        write_embeddings(path, table.embedding)
+
+
+def _other_columns(others: OtherClasses) -> list[list[str]]:
+    """Return the columns of id, name and score of each of the other classes, in turn."""
+    columns = []
+    for ids, scores in zip(others.class_id.T.tolist(), others.score.T.tolist(), strict=True):
+        columns.append(["" if one < 0 else str(one) for one in ids])
+        columns.append([others.class_names.get(one, "") for one in ids])
+        there = zip(ids, scores, strict=True)
+        columns.append(["" if one < 0 else short(score) for one, score in there])
+    return columns
 
 
 def short(value: float) -> str:

@@ -31,6 +31,7 @@ from dqslam.io.detections.columns import (
 )
 from dqslam.io.detections.csv import CORNER
 from dqslam.io.detections.json_list import Entry, parse_entries, parse_lines
+from dqslam.io.detections.other_classes import class_columns
 from dqslam.io.detections.records import Records, make_table
 from dqslam.io.detections.table import NO_SCORE, DetectionTable
 from dqslam.io.files import FileError, read_text
@@ -83,6 +84,9 @@ def flat_table(
             return None
         return np.array([entry.number(names[name], default) for entry in entries])
 
+    def scores(name: str) -> Floats:
+        return np.array([entry.number(names[name], np.nan) for entry in entries])
+
     frame: Ints | None = None
     if "frame" in names:
         frame = np.array([entry.integer(names["frame"]) for entry in entries], dtype=np.int64)
@@ -97,6 +101,7 @@ def flat_table(
         class_id=labels("class_id"),
         class_name=labels("class_name"),
         track_id=labels("track_id"),
+        others=class_columns(path, names, labels, scores),
     )
     return make_table(path, format_name, records, context)
 

@@ -11,6 +11,7 @@ import numpy as np
 from dqslam._checks import Floats, Ints
 from dqslam._limits import IN_REACH
 from dqslam.io.detections.classes import number_classes
+from dqslam.io.detections.other_classes import ClassColumn, joined_labels, other_classes
 from dqslam.io.detections.table import NO_SCORE, DetectionTable
 from dqslam.io.files import FileError, in_reach
 from dqslam.io.formats import ReadContext
@@ -42,6 +43,8 @@ class Records:
     class_name: Sequence[str] | None = None
     track_id: Sequence[str] | None = None
     files: Sequence[str] | None = None
+    others: Sequence[ClassColumn] = ()  #: other classes of the boxes, the likeliest first
+    embedding: Floats | None = None  #: what each box looks like, shape (m, e)
     all_images: Sequence[str] = ()  #: names of all images, also of those without boxes
     first_frame: int | None = None  #: the number of the first frame, if the format has one
     image_size: tuple[int, int] | None = None
@@ -67,13 +70,21 @@ def make_table(
         raise FileError(path, "holds no boxes")
     frame, named_time = _frames(path, records, context)
     time = _times(path, format_name, records, context, frame, named_time)
+    count = len(records.line)
+    ids, names = joined_labels(path, records.class_id, records.class_name, records.others)
     class_id, class_name = number_classes(
         path,
-        records.class_id,
-        records.class_name,
+        ids,
+        names,
         dict(records.class_names),
-        len(records.line),
+        len(ids or names or records.line),
         context,
+        lambda row, message: records.error(path, row % count, message),
+    )
+    others = other_classes(
+        records.others,
+        class_id,
+        class_name,
         lambda row, message: records.error(path, row, message),
     )
     track = None
@@ -88,11 +99,13 @@ def make_table(
         timestamp=time,
         box=records.box,
         score=score,
-        class_id=class_id,
-        class_name=class_name,
+        class_id=class_id[:count],
+        class_name=class_name[:count],
         track_id=track,
         files=None if records.files is None else tuple(records.files),
         image_size=records.image_size,
+        others=others,
+        embedding=records.embedding,
         assumed_first=context.first_frame is None
         and named_time is None
         and context.frames is not None

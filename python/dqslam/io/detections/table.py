@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from dqslam.io.detections.other_classes import OtherClasses
 from dqslam.io.files import FileError
 from dqslam.io.labels import NO_LABEL
 from dqslam.io.notes import Notes
@@ -30,6 +31,8 @@ class DetectionTable:
     ``score`` (m,) 0..1; ``class_id``, ``track_id`` (m,), -1 for none, or None without that column;
     ``files`` (m,) the file of each row, where ``path`` is a folder of several;
     ``image_size`` width and height in px, if the file has it;
+    ``others`` other classes of the boxes, if the file has any;
+    ``embedding`` (m, e) what each box looks like, if there is such a file;
     ``assumed_first`` whether nothing says which number the first frame has.
     """
 
@@ -45,6 +48,8 @@ class DetectionTable:
     track_id: NDArray[np.int64] | None
     files: tuple[str, ...] | None = None
     image_size: tuple[int, int] | None = None
+    others: OtherClasses | None = None
+    embedding: NDArray[np.float64] | None = None
     assumed_first: bool = False
 
     def __len__(self) -> int:
@@ -72,6 +77,8 @@ class DetectionTable:
             class_name=tuple(self.class_name[row] for row in rows),
             track_id=None if self.track_id is None else self.track_id[rows],
             files=None if self.files is None else tuple(self.files[row] for row in rows),
+            others=None if self.others is None else self.others.select(rows),
+            embedding=None if self.embedding is None else self.embedding[rows],
         )
 
 
