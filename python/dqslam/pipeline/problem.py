@@ -86,10 +86,10 @@ def kept_problem(output: EstimatorOutput, recording: Recording, mode: _core.Mode
     graph, state = problem_of(output, recording)
     if output.repeated is None:
         return graph
-    return _with_repeated_errors(graph, state, output.repeated, output)
+    return with_repeated_errors(graph, state, output.repeated, output)
 
 
-def _with_repeated_errors(
+def with_repeated_errors(
     graph: Graph, state: _core.State, noise: RepeatedNoise, output: EstimatorOutput
 ) -> Graph:
     """Return a problem whose boxes have the variances of ``RepeatedNoise.together``."""
