@@ -95,6 +95,8 @@ if TYPE_CHECKING:  # the one list of public names, a line each: lazy_exports rea
     from dqslam.pipeline import run_files as run_files
     from dqslam.placements import Placements as Placements
     from dqslam.placements import SupportPlane as SupportPlane
+    from dqslam.placements import UpDirection as UpDirection
+    from dqslam.placements import placed_covariances as placed_covariances
     from dqslam.placements import solve_with_placements as solve_with_placements
     from dqslam.places import Alignment as Alignment
     from dqslam.places import CannotTellError as CannotTellError

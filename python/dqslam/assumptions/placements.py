@@ -38,6 +38,9 @@ class PlacementRules:
     rules: tuple[PlacementRule, ...]
     up: tuple[float, float, float] | None = None
     """A unit vector in the world; None where it is that of the scene priors, by default z."""
+    up_sigma: float | None = None
+    """By how much it may be off about each horizontal axis, radians; it is then estimated from the
+    planes that objects stand on. None where it is exact."""
 
 
 class _Rule(BaseModel):
@@ -87,6 +90,7 @@ class _Table(BaseModel):
     model_config = ConfigDict(extra="forbid")
     placements: Annotated[list[_Rule], Field(min_length=1)]
     up: tuple[float, float, float] | None = None
+    up_sigma_deg: Annotated[float | None, Field(ge=1e-3, le=90.0)] = None
 
     @field_validator("up")
     @classmethod
@@ -113,7 +117,8 @@ def load_placements(path: str | Path) -> PlacementRules:
     - ``aligned_with = "desk"`` with ``sigma_deg`` (5), for the horizontal axes of the nearest one;
     - ``upright = true`` with ``sigma_deg`` (5).
 
-    ``up = [0, -1, 0]`` above the first table is the direction up in the world, by default z.
+    ``up = [0, -1, 0]`` above the first table is the direction up in the world, by default z, and
+    ``up_sigma_deg = 5`` says by how much it may be off: it is then estimated.
 
     Raises
     ------
@@ -122,7 +127,11 @@ def load_placements(path: str | Path) -> PlacementRules:
         setting.
     """
     table = load_toml_model(path, _Table)
-    return PlacementRules(tuple(entry.rule() for entry in table.placements), table.unit_up())
+    rules = tuple(entry.rule() for entry in table.placements)
+    sigma = table.up_sigma_deg
+    return PlacementRules(
+        rules, table.unit_up(), None if sigma is None else float(np.deg2rad(sigma))
+    )
 
 
 def check_placement_classes(rules: Sequence[PlacementRule], known: Collection[str]) -> None:

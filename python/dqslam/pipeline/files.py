@@ -161,8 +161,12 @@ def _run(
 def _check_extras(options: RunFilesOptions) -> None:
     """Refuse files of measurements that could take no part."""
     extras = options.extras
-    if options.mode == _core.Mode.MAPPING and any(vars(extras).values()):
-        raise ValueError("measurements: mode MAPPING takes the poses for known, and has no use")
+    of_poses = extras.absolute is not None or extras.closures is not None
+    if options.mode == _core.Mode.MAPPING and of_poses:
+        raise ValueError(
+            "absolute positions and closures: mode MAPPING takes the poses for known, and has no "
+            "use for them"
+        )
     if extras.positions is not None and (options.ids == "none" or options.trust_ids != FINAL):
         raise ValueError("positions: the ids of boxes must be final, or objects are not known")
 

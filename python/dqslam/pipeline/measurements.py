@@ -23,21 +23,25 @@ def usable_measurements(
     """Return the recording with the measurements that can take part, and why others cannot."""
     if not _has_any(recording):
         return recording, ()
-    if options.mode == _core.Mode.MAPPING:
-        why = "measurements took no part: mode MAPPING takes the poses for known"
-        return replace(recording, positions=None, absolute=None, closures=None), (why,)
+    reasons: tuple[str, ...] = ()
+    if options.mode == _core.Mode.MAPPING and _has_any_of_poses(recording):
+        reasons = (
+            "absolute positions and loop closures took no part: mode MAPPING takes the poses for "
+            "known",
+        )
+        recording = replace(recording, absolute=None, closures=None)
     positions, ids = recording.positions, recording.detections.object_id
     if positions is None:
-        return recording, ()
+        return recording, reasons
     if options.trust_ids != FINAL:
         why = "positions took no part: the ids of boxes must be final, or objects are not known"
-        return replace(recording, positions=None), (why,)
+        return replace(recording, positions=None), (*reasons, why)
     seen = np.isin(positions.object_id, ids)
     if seen.all():
-        return recording, ()
+        return recording, reasons
     name = positions.object_id[np.argmin(seen)]
     why = f"{np.sum(~seen)} positions took no part: object {name} and the like have no box"
-    return replace(recording, positions=positions.select(seen)), (why,)
+    return replace(recording, positions=positions.select(seen)), (*reasons, why)
 
 
 def with_measurements(
@@ -45,7 +49,8 @@ def with_measurements(
 ) -> EstimatorOutput:
     """Return the estimate of all poses and mapped objects with the recording's measurements.
 
-    It starts at the estimate without them. With absolute positions it is in their frame.
+    It starts at the estimate without them. With absolute positions it is in their frame. In mode
+    MAPPING the poses stay, and positions move objects only.
     """
     if not _has_any(recording):
         return output
@@ -72,5 +77,10 @@ def with_measurements(
 
 
 def _has_any(recording: Recording) -> bool:
-    given = (recording.positions, recording.absolute, recording.closures)
+    positions = recording.positions
+    return (positions is not None and len(positions) > 0) or _has_any_of_poses(recording)
+
+
+def _has_any_of_poses(recording: Recording) -> bool:
+    given = (recording.absolute, recording.closures)
     return any(one is not None and len(one) > 0 for one in given)

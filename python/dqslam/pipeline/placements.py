@@ -8,19 +8,20 @@ import numpy as np
 
 from dqslam import _core
 from dqslam._checks import Floats, Ints
+from dqslam.assumptions import PlacementRules
 from dqslam.estimate import Estimate
 from dqslam.metrics import up_direction
 from dqslam.pipeline.conclude import EstimatorOutput
 from dqslam.pipeline.options import RunOptions
 from dqslam.pipeline.placement_report import describe_placements
-from dqslam.pipeline.problem import problem_of
-from dqslam.placements import solve_with_placements
+from dqslam.pipeline.problem import problem_of, with_repeated_errors
+from dqslam.placements import placed_covariances, solve_with_placements
 from dqslam.recording import Recording
 from dqslam.subgraph import rebuilt
-from dqslam.uncertainty import marginal_covariances
 
 # The cameras' own direction is known to some 20 degrees only: z is believed if it is within 45.
 Z_IS_UP = 0.7
+HELD_SIGMA = float(np.deg2rad(20.0))
 
 
 def with_placements(
@@ -30,14 +31,16 @@ def with_placements(
 
     The poses and the covariances stay as they are if poses were given, or were estimated with the
     parts of the noise that repeat, through a lens, or with absolute positions. The covariances are
-    then those without the rules, which are larger.
+    then those without the rules, which are larger. Where up is only known from how the cameras are
+    held, it is estimated.
     """
     rules, before = options.placements, output.estimate
     if rules is None or not len(before.object_ids) or np.isnan(before.ellipsoids).any():
         return output
-    up = _up(before) if rules.up is None else rules.up
-    rules = replace(rules, up=up)
+    rules = _with_up(rules, before)
     graph, state = problem_of(output, recording)
+    if output.repeated is not None:  # else all boxes of an object together would outweigh any rule
+        graph = with_repeated_errors(graph, state, output.repeated, output)
     rows = np.searchsorted(before.object_ids, graph.object_ids)
     if before.object_shapes:
         shapes = [before.object_shapes[row] for row in rows]
@@ -66,14 +69,14 @@ def with_placements(
     )
     marginals = output.marginals
     if marginals is not None and not poses_stay:
-        known = marginal_covariances(placed, found, solver)
+        known = placed_covariances(placed, found, placements, solver)
         marginals = replace(known, objects=_with_rows(marginals.objects, rows, known.objects))
     return replace(
         output,
         estimate=estimate,
         marginals=marginals,
         summary=output.summary if poses_stay else summary,
-        placements=describe_placements(placements, found) | {"up": list(up)},
+        placements=describe_placements(placements, found, rules),
     )
 
 
@@ -83,10 +86,15 @@ def _with_rows(values: Floats, rows: Ints, changed: Floats) -> Floats:
     return values
 
 
-def _up(estimate: Estimate) -> tuple[float, float, float]:
-    """Return z, or where the cameras are held in another way, as in a camera's frame, their up."""
-    if estimate.pose_model == _core.PoseModel.SE2:
-        return 0.0, 0.0, 1.0
-    cameras = _core.world_from_camera(estimate.pose_model, estimate.camera, estimate.poses)
-    x, y, z = up_direction(cameras).tolist()
-    return (0.0, 0.0, 1.0) if z > Z_IS_UP else (x, y, z)
+def _with_up(rules: PlacementRules, estimate: Estimate) -> PlacementRules:
+    """Return rules that name up: z, or where cameras are held in another way, roughly their up."""
+    if rules.up is not None:
+        return rules
+    x, y, z = 0.0, 0.0, 1.0
+    if estimate.pose_model != _core.PoseModel.SE2:
+        cameras = _core.world_from_camera(estimate.pose_model, estimate.camera, estimate.poses)
+        x, y, z = up_direction(cameras).tolist()
+    if z > Z_IS_UP:
+        return replace(rules, up=(0.0, 0.0, 1.0))
+    sigma = HELD_SIGMA if rules.up_sigma is None else rules.up_sigma
+    return replace(rules, up=(x, y, z), up_sigma=sigma)

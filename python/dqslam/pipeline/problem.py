@@ -97,7 +97,7 @@ def believed_problem(
         output = replace(output, odometry_noise=None)
     graph, state = problem_of(output, recording)
     if output.repeated is not None:
-        graph = _with_repeated_errors(graph, state, output.repeated, output)
+        graph = with_repeated_errors(graph, state, output.repeated, output)
     return graph, state
 
 
@@ -108,7 +108,7 @@ def state_of(output: EstimatorOutput, graph: Graph) -> _core.State:
     return _core.State(estimate.poses, estimate.ellipsoids[rows], shared=estimate.shared)
 
 
-def _with_repeated_errors(
+def with_repeated_errors(
     graph: Graph, state: _core.State, noise: RepeatedNoise, output: EstimatorOutput
 ) -> Graph:
     """Return a problem whose boxes have the variances of ``RepeatedNoise.together``."""

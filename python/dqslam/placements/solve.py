@@ -13,10 +13,18 @@ from dqslam._core import SolveOptions
 from dqslam.assumptions import PlacementRules, check_placement_classes
 from dqslam.estimate import Estimate
 from dqslam.graph import Graph, solve
+from dqslam.placements.estimated_up import (
+    mapped_part,
+    state_of,
+    up_of,
+    with_uncertain_up,
+    with_up,
+)
 from dqslam.placements.planes import FoundPlane
 from dqslam.placements.table import FREE_HEIGHT_SIGMAS, Row, as_table, objects_of, place
-from dqslam.subgraph import only_objects, rebuilt
-from dqslam.uncertainty import marginal_covariances
+from dqslam.placements.up import UpDirection
+from dqslam.subgraph import rebuilt
+from dqslam.uncertainty import Marginals, marginal_covariances
 
 # Planes and partners are found anew with each estimate, until they stay or so often.
 _ROUNDS = 3
@@ -31,7 +39,7 @@ class SupportPlane:
     height: float
     """Meters along the direction up."""
     sigma: float
-    """Standard deviation of the height, meters."""
+    """Standard deviation of the height, meters, at the direction up that was told or estimated."""
     object_ids: Ints
     """The objects that stand on it."""
 
@@ -49,6 +57,8 @@ class Placements:
     """The object that it refers to, or -1, shape (p,)."""
     holds: Bools
     """Whether the estimate agrees with it within three sigmas, shape (p,)."""
+    up: UpDirection | None = None
+    """The direction up, where it was estimated."""
 
 
 def solve_with_placements(
@@ -65,6 +75,10 @@ def solve_with_placements(
     height of a plane is an unknown. A placement that does not fit costs 4.5 in half a chi-square at
     most, and hardly moves anything: the rules may be wrong for some objects.
 
+    If the rules have ``up_sigma``, the direction up is estimated, too, from the lowest points of
+    the objects that rules put on planes. The covariances of the result are then those of
+    ``placed_covariances``.
+
     Parameters
     ----------
     graph
@@ -77,7 +91,7 @@ def solve_with_placements(
     Returns
     -------
     graph
-        The problem with the placements, for ``marginal_covariances``.
+        The problem with the placements, for ``placed_covariances``.
     estimate, summary
         As of ``solve``.
     placements
@@ -92,34 +106,41 @@ def solve_with_placements(
     require(rules, PlacementRules, "solve_with_placements", "load_placements(file) reads them")
     check_placement_classes(rules.rules, set(graph.class_names))
     if rules.up is not None:
-        graph = _with_up(graph, rules.up)
+        graph = with_up(graph, np.array(rules.up))
     options = SolveOptions() if options is None else options
     estimate, summary = solve(graph, options, start=start)
+    up = None
+    if rules.up_sigma is not None and len(estimate.object_ids):
+        up = up_of(graph, estimate, rules.rules, rules.up_sigma, options)
+        graph = with_up(graph, up.direction)
     placed, known = graph, len(graph.core.shared_sigma)
     rows: list[Row] = []
     planes: list[FoundPlane] = []
     for _ in range(_ROUNDS):
-        objects = objects_of(graph, estimate, marginal_covariances(placed, estimate, options))
+        marginals = marginal_covariances(placed, estimate, options)
+        objects = objects_of(graph, estimate, marginals.objects)
         before = [_what(row) for row in rows]
         rows, planes = place(rules.rules, objects)
         if [_what(row) for row in rows] == before:
             break
         placed = _with_rows(graph, rows, planes, known)
         estimate, summary = solve(placed, options, start=start)
-    return placed, estimate, summary, _placements(placed, estimate, options, planes, known)
+    found = _placements(placed, estimate, options, planes, known)
+    return placed, estimate, summary, replace(found, up=up)
 
 
-def _with_up(graph: Graph, up: tuple[float, float, float]) -> Graph:
-    scene = graph.core.scene_priors
-    turned = _core.ScenePriors(
-        up=up,
-        plane_offset=scene.plane_offset,
-        upright_sigma=scene.upright_sigma,
-        support_sigma=scene.support_sigma,
-        camera_height=scene.camera_height,
-        camera_height_sigma=scene.camera_height_sigma,
-    )
-    return replace(graph, core=rebuilt(graph.core, scene_priors=turned))
+def placed_covariances(
+    graph: Graph, estimate: Estimate, placements: Placements, options: SolveOptions | None = None
+) -> Marginals:
+    """Return the covariances of what ``solve_with_placements`` answers.
+
+    They are those of ``marginal_covariances``, and larger by what the uncertainty of the direction
+    up moves, if that was estimated.
+    """
+    options = SolveOptions() if options is None else options
+    if placements.up is None:
+        return marginal_covariances(graph, estimate, options)
+    return with_uncertain_up(graph, estimate, placements.up, options)
 
 
 def _what(row: Row) -> tuple[_core.Placement, int, int, int]:
@@ -145,13 +166,10 @@ def _placements(
     planes: Sequence[FoundPlane],
     known: int,
 ) -> Placements:
-    core = only_objects(graph.core, np.isin(graph.object_ids, estimate.object_ids))
-    landmarks = estimate.landmarks if estimate.is_body.any() else estimate.ellipsoids
-    shapes = list(estimate.object_shapes)
-    state = _core.State(estimate.poses, landmarks, shapes, estimate.shared)
+    core = mapped_part(graph, estimate)
     sigmas = marginal_covariances(graph, estimate, options).shared
     table, ids = core.placements, estimate.object_ids
-    holds = _core.placement_misfits(core, options, state) <= MOST_SIGMAS
+    holds = _core.placement_misfits(core, options, state_of(estimate)) <= MOST_SIGMAS
 
     def plane(number: int) -> SupportPlane:
         shared = known + number

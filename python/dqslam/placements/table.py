@@ -12,8 +12,8 @@ from dqslam._checks import Floats, Ints
 from dqslam.assumptions import GROUND, PLANE, PlacementRule
 from dqslam.estimate import Estimate
 from dqslam.graph import Graph
+from dqslam.placements.lowest_points import gradients_by_objects, height_sigmas, tangents
 from dqslam.placements.planes import FoundPlane, find_planes
-from dqslam.uncertainty import Marginals
 
 # The height of a plane is free: the prior on how far it is from where it was found.
 FREE_HEIGHT_SIGMAS = 1e3
@@ -56,21 +56,18 @@ class Objects:
         return self.centers[:, 2] + self.reach[:, 1]
 
 
-def objects_of(graph: Graph, estimate: Estimate, marginals: Marginals) -> Objects:
-    """Return the objects of an estimate in a frame whose third axis is up."""
+def objects_of(graph: Graph, estimate: Estimate, covariances: Floats) -> Objects:
+    """Return the objects of an estimate, of covariances (o, 9, 9), with the third axis up."""
     up = graph.core.scene_priors.up
-    east = np.cross(up, np.eye(3)[np.argmin(np.abs(up))])
-    east /= np.linalg.norm(east)
-    axes = np.vstack([east, np.cross(up, east), up])
-    shapes = axes @ estimate.shapes @ axes.T
-    widths = np.sqrt(np.maximum(np.einsum("nii->ni", shapes), 0.0))
-    height_variance = np.einsum("i,nij,j->n", up, marginals.centers, up)
+    axes = np.vstack([tangents(up), up])
+    solids = estimate.solids
+    reach = np.stack([solids.support(axis) for axis in axes], axis=1)
     return Objects(
         rows=np.flatnonzero(np.isin(graph.object_ids, estimate.object_ids)),
         class_names=estimate.class_names,
         centers=estimate.centers @ axes.T,
-        reach=np.column_stack([widths[:, :2].max(axis=1), widths[:, 2]]),
-        height_sigmas=np.sqrt(height_variance),
+        reach=np.column_stack([reach[:, :2].max(axis=1), reach[:, 2]]),
+        height_sigmas=height_sigmas(gradients_by_objects(estimate, up), covariances),
     )
 
 

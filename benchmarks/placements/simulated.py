@@ -1,4 +1,4 @@
-"""``python -m benchmarks.placements``: what rules of placement give, and what wrong ones cost."""
+"""Rules of placement in simulated worlds: what they give, and what wrong ones cost."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def measure_harm(seeds: range) -> None:
         typer.echo(f"| {name} | {poses:.4f} | {centers:.4f} |")
 
 
-def main(
+def tabulate(
     trials: Annotated[int, typer.Option(help="Number of seeds.")] = 50,
     seed: Annotated[int, typer.Option(help="The first seed.")] = 0,
 ) -> None:
@@ -94,7 +94,3 @@ def main(
     measure_table(seeds)
     typer.echo("")
     measure_harm(seeds)
-
-
-if __name__ == "__main__":
-    typer.run(main)
