@@ -1,7 +1,8 @@
 """Objects that their own boxes contradict.
 
 Ids that are switched give an object the boxes of another one. If most of its boxes are such, it is
-mapped where the other one is, fits these boxes, and looks certain.
+mapped where the other one is, fits these boxes, and looks certain. Two objects may also get most of
+each other's boxes, and be mapped in each other's places.
 """
 
 from __future__ import annotations
@@ -15,6 +16,10 @@ from dqslam._checks import Bools, Floats, Ints
 MOST_MISFITS = 0.5
 # Two objects are at one place where this share of the boxes that fit the one would fit the other.
 SAME_PLACE_SHARE = 0.5
+# The ids of two objects may be exchanged where the boxes of the one that show the other are at
+# least this share of those that fit it, and at least so many.
+EXCHANGED_SHARE = 0.4
+FEWEST_EXCHANGED = 3
 
 
 def contradicted_objects(
@@ -22,7 +27,8 @@ def contradicted_objects(
 ) -> dict[int, str]:
     """Return the objects that their boxes contradict, with the reason, by id.
 
-    Of two objects at one place, it is the one that fewer boxes fit.
+    Of two objects at one place, it is the one that fewer boxes fit. Where many of the boxes of an
+    object show another one instead, each may be in the other's place: no data tell.
 
     Parameters
     ----------
@@ -44,7 +50,15 @@ def contradicted_objects(
         if misfits > MOST_MISFITS * count[row]:
             reasons[int(object_ids[row])] = f"{misfits} of {count[row]} boxes do not fit"
             continue
-        rivals = real & _near(landmarks, reach, row) & (fit >= fit[row])
+        if misfits >= max(FEWEST_EXCHANGED, EXCHANGED_SHARE * fit[row]):
+            shown, other = _shown_instead(core, state, np.flatnonzero(real), inliers, row)
+            if shown >= max(FEWEST_EXCHANGED, EXCHANGED_SHARE * fit[row]):
+                reasons[int(object_ids[row])] = (
+                    f"{shown} of its boxes show object {object_ids[other]}, and {fit[row]} fit its "
+                    "place: their ids may be exchanged"
+                )
+                continue
+        rivals = real & _near(state.landmarks, reach, row) & (fit >= fit[row])
         for other in np.flatnonzero(rivals).tolist():
             if other == row or (fit[other] == fit[row] and other > row):
                 continue
@@ -55,6 +69,16 @@ def contradicted_objects(
                 )
                 break
     return reasons
+
+
+def _shown_instead(
+    core: _core.Graph, state: _core.State, objects: Ints, inliers: Bools, row: int
+) -> tuple[int, int]:
+    """Return how many of an object's other boxes fit the object that most of them fit; its row."""
+    boxes = np.flatnonzero(~inliers & (core.boxes.object == row))
+    others = objects[objects != row].tolist()
+    counts = [int(_fits(core, state, boxes, other).sum()) for other in others]
+    return max(zip(counts, others, strict=True), default=(0, row))
 
 
 def _longest_semi_axes(ellipsoids: Floats) -> Floats:

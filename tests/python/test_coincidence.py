@@ -133,3 +133,42 @@ def test_a_second_look_finds_the_better_set_of_boxes():
         gains.append(costs[0] - costs[1])
     assert min(gains) >= 0.0
     assert max(gains) > 10.0
+
+
+def exchanged(recording, first, second, period, share):
+    """Exchange the ids of two objects in the first boxes of each period of their boxes."""
+    detections = recording.detections
+    ids = detections.object_id.copy()
+    for own, other in ((first, second), (second, first)):
+        mine = np.flatnonzero(detections.object_id == own)
+        ids[mine[np.arange(len(mine)) % period < share * period]] = other
+    return replace(recording, detections=replace(detections, object_id=ids))
+
+
+@pytest.mark.parametrize("share", [0.4, 0.6])
+def test_two_objects_whose_ids_may_be_exchanged_are_named(share):
+    recording, truth = drive()
+    names, counts = np.unique(recording.detections.object_id, return_counts=True)
+    first, second = (int(name) for name in names[np.argsort(-counts)[:2]])
+    recording = exchanged(recording, first, second, period=20, share=share)
+    graph = dq.build_graph(recording, box_noise=NOISE)
+    estimate, _ = dq.solve(graph)
+    assert set(estimate.contradicted) == {first, second}
+    for name, other in ((first, second), (second, first)):
+        assert f"of its boxes show object {other}, and" in estimate.contradicted[name]
+    # With 40 % they are in their own places, with 60 % in each other's: the boxes look alike.
+    row = int(np.flatnonzero(estimate.object_ids == first)[0])
+    place = truth.center[truth.object_id == (first if share < 0.5 else second)][0]
+    assert np.linalg.norm(estimate.centers[row] - place) < 0.3
+    way = truth.center[truth.object_id == first][0] - truth.center[truth.object_id == second][0]
+    variance = dq.marginal_covariances(graph, estimate).centers[row]
+    assert way @ np.linalg.solve(variance, way) < 30.0
+
+
+def test_a_fifth_of_the_ids_exchanged_names_nobody():
+    recording, _ = drive()
+    names, counts = np.unique(recording.detections.object_id, return_counts=True)
+    first, second = (int(name) for name in names[np.argsort(-counts)[:2]])
+    recording = exchanged(recording, first, second, period=20, share=0.2)
+    estimate, _ = dq.solve(dq.build_graph(recording, box_noise=NOISE))
+    assert estimate.contradicted == {}

@@ -173,9 +173,9 @@ std::vector<bool> StuckObjects(const SolveContext& context,
   return stuck;
 }
 
-bool IsTorn(const PreparedGraph& prepared, const State& state) {
+Eigen::VectorXd OdometryChiSquares(const PreparedGraph& prepared, const State& state) {
   const OdometryTable& odometry = prepared.graph.odometry;
-  double chi_square = 0;
+  Eigen::VectorXd chi_squares(odometry.size());
   Dispatch(prepared.graph.pose_model, [&](auto model) {
     using Pose = decltype(model);
     for (int row = 0; row < odometry.size(); ++row) {
@@ -185,10 +185,16 @@ bool IsTorn(const PreparedGraph& prepared, const State& state) {
                     odometry.relative.row(row).data(),
                     predicted.data());
       Minus<Pose>(predicted.data(), state.poses.row(odometry.to[row]).data(), error.data());
-      chi_square += (prepared.odometry_sqrt_information[row] * error).squaredNorm();
+      chi_squares[row] = (prepared.odometry_sqrt_information[row] * error).squaredNorm();
     }
   });
-  return chi_square > kTorn * odometry.size() * prepared.graph.tangent_size();
+  return chi_squares;
+}
+
+bool IsTorn(const PreparedGraph& prepared, const State& state) {
+  const Eigen::VectorXd chi_squares = OdometryChiSquares(prepared, state);
+  return chi_squares.sum() >
+         kTorn * static_cast<double>(chi_squares.size()) * prepared.graph.tangent_size();
 }
 
 Stage BatchStage(const SolveContext& context) {

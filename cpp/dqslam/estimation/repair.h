@@ -21,6 +21,9 @@ Stage StageOfObject(const Stage& all, const std::vector<int>& boxes, const Graph
 /// chi-square exceeds 13.28, which is the 99 % quantile, or the mean exceeds twice that.
 std::vector<bool> StuckObjects(const SolveContext& context, const Stage& stage, const State& state);
 
+/// The squared Mahalanobis distance of each odometry row from the poses.
+Eigen::VectorXd OdometryChiSquares(const PreparedGraph& prepared, const State& state);
+
 /// Whether odometry fits so badly, with a chi-square above 5 per degree of freedom, that a part of
 /// the path must have the wrong orientation.  Boxes can fit well there, because a heading that is
 /// wrong by a whole turn shows the same images.

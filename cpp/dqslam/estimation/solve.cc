@@ -8,6 +8,7 @@
 
 #include "dqslam/estimation/graduated.h"
 #include "dqslam/estimation/grow.h"
+#include "dqslam/estimation/misfits.h"
 #include "dqslam/estimation/repair.h"
 #include "dqslam/estimation/shapes.h"
 #include "dqslam/estimation/start_object.h"
@@ -88,9 +89,8 @@ class Solver {
   /// The cost by which attempts are compared: that of the boxes that fit, and the threshold for
   /// each of the others.
   double TruncatedCost(const State& state, const Summary& summary) const {
-    if (!Graduates()) return summary.final_cost;
-    const auto misfits = (!Inliers(state)).count();
-    return summary.final_cost + 0.5 * options_.outlier_chi_square * misfits;
+    return Graduates() ? dqslam::TruncatedCost(context_, state, summary.final_cost)
+                       : summary.final_cost;
   }
 
   /// Singular values of every object's SVD fit at the initial poses; NaN for fewer than 3 views.
@@ -152,6 +152,7 @@ class Solver {
       Append(Batch(last, state), &summary);
     }
     if (Refines()) {
+      if (Graduates() && !start) RestartMisfits(context_, &last, state, &summary);
       Recover(context_, last, state, &summary);
       RestartStuckObjects(context_, last, state, &summary);
       TryOtherStarts(context_, last, false, state, &summary);
@@ -256,18 +257,28 @@ Summary SolveInAttempts(const SolveContext& context,
   return best;
 }
 
-// What speaks against objects under a robust loss: wrong ids look like this.
-std::string ObjectionToObjects(const PreparedGraph& prepared, const Mask& inliers) {
+// What speaks against objects and poses under a robust loss.  Wrong ids look like the first.
+std::string ObjectionToMisfits(const SolveContext& context,
+                               const State& state,
+                               const Mask& inliers) {
   int misfits = 0;
-  for (const std::vector<int>& rows : prepared.boxes_of_object) {
+  for (const std::vector<int>& rows : context.prepared.boxes_of_object) {
     const auto fit = std::count_if(rows.begin(), rows.end(), [&](int row) { return inliers[row]; });
     if (static_cast<int>(rows.size()) >= kSomeBoxes &&
         2 * fit < static_cast<std::ptrdiff_t>(rows.size()))
       ++misfits;
   }
-  if (misfits == 0) return "";
-  return "most boxes of " + std::to_string(misfits) + (misfits == 1 ? " object" : " objects") +
-         " do not fit";
+  if (misfits > 0) {
+    return "most boxes of " + std::to_string(misfits) + (misfits == 1 ? " object" : " objects") +
+           " do not fit";
+  }
+  if (context.options.mode == Mode::kMapping) return "";
+  const std::vector<PoseRun> runs = MisplacedPoses(context, state);
+  if (runs.empty()) return "";
+  const std::string first = std::to_string(runs[0].first), last = std::to_string(runs[0].last);
+  return runs[0].first == runs[0].last
+             ? "pose " + first + " fits neither its odometry nor its boxes"
+             : "poses " + first + " to " + last + " fit neither their odometry nor their boxes";
 }
 
 }  // namespace
@@ -297,7 +308,7 @@ Solution Solve(const Graph& graph,
   });
   solution.poses = state.poses;
   solution.inliers = solver.Inliers(state);
-  const std::string objection = ObjectionToObjects(prepared, solution.inliers);
+  const std::string objection = ObjectionToMisfits(context, state, solution.inliers);
   if (IsRobust(options.loss) && solution.summary.converged && !objection.empty()) {
     solution.summary.converged = false;
     solution.summary.message = objection;
