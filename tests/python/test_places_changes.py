@@ -12,7 +12,6 @@ from dqslam.places.changes_map import SeenMap, missed
 from dqslam.places.visibility import view_objects
 from small_place import CENTERS, NAMES, pose_at, write_map, write_turned
 
-
 IDENTITY = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
 
 
