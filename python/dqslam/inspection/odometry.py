@@ -10,6 +10,7 @@ from dqslam._checks import Bools, Floats
 from dqslam.inspection.evidence import Evidence, Finding, NotEnoughDataError
 from dqslam.inspection.pose_checks import NOISY
 from dqslam.inspection.tracks import doubles
+from dqslam.inspection.usual_sizes import USUAL_M, size_factor
 from dqslam.inspection.windows import LENGTHS
 from dqslam.io import Trajectory
 from dqslam.io.span import seconds as seconds_of
@@ -18,7 +19,11 @@ from dqslam.io.span import seconds as seconds_of
 # faster half of the time than cars and drones are [m/s].
 LARGEST_M, SMALLEST_M, FASTEST_M_S = 20.0, 5e-4, 40.0
 UNITS = {"millimeters": 1e-3, "centimeters": 1e-2, "kilometers": 1e3}
-USUAL_M = (0.01, 10.0)
+# Known classes tell these as well.
+CLOSE_UNITS = UNITS | {"inches": 0.0254, "feet": 0.3048}
+USUAL_RANGE_M = (0.01, 10.0)
+MOST_NAMED = 4
+LIKE = 1.8  #: a unit is likely if sizes are usual in it to within this factor
 # A step is a jump if it is so many times as long, or as fast, as nine tenths of all steps.
 JUMP, FAST = 6.0, 4.0
 GAP = 3.0  #: median intervals that make a gap
@@ -38,25 +43,48 @@ def check_units(evidence: Evidence) -> Finding | None:
         there = views.windows.there
     box = evidence.table.box[rows]
     side = np.sqrt(np.prod(np.abs(box[..., 2:] - box[..., :2]), axis=-1)) / evidence.camera.fx
-    size = (side * fit.depth)[there & np.isfinite(fit.depth) & (fit.depth > 0)]
+    known = there & np.isfinite(fit.depth) & (fit.depth > 0)
+    size = (side * fit.depth)[known]
     if size.size < len(LENGTHS):
         raise NotEnoughDataError("no object has a known distance")
     usual = float(np.median(size))
     times, poses = evidence.trajectory
     steps = np.linalg.norm(np.diff(poses[:, :3], axis=0), axis=1)
     speed = float(np.median(steps / np.diff(times)))
+    names = np.array(evidence.table.class_name, dtype=object)[rows[known]]
+    classes = {name: float(np.median(size[names == name])) for name in set(names.tolist())}
+    factor = size_factor(classes)
+    if factor is not None:
+        return _of_classes(factor, classes)
     if SMALLEST_M <= usual <= LARGEST_M and speed <= FASTEST_M_S:
         return None
     likely = [
         f"{unit} (--length-scale {meters:g})"
         for unit, meters in UNITS.items()
-        if USUAL_M[0] <= usual * meters <= USUAL_M[1]
+        if USUAL_RANGE_M[0] <= usual * meters <= USUAL_RANGE_M[1]
     ]
     meant = f": they may be {' or '.join(likely)}" if likely else ""
     return Finding(
         "units",
         f"objects would be {usual:.3g} m large, the path {steps.sum():.3g} m long, and the camera "
         f"{speed:.3g} m/s fast, if the positions of the poses were meters{meant}",
+    )
+
+
+def _of_classes(factor: float, classes: dict[str, float]) -> Finding:
+    """Return the finding that objects of well-known classes have sizes that they never have."""
+    named = [name for name in sorted(classes) if name in USUAL_M][:MOST_NAMED]
+    shown = ", ".join(f"{name} {classes[name]:.2g} m" for name in named)
+    likely = [
+        f"{unit} (--length-scale {meters:g})"
+        for unit, meters in CLOSE_UNITS.items()
+        if abs(np.log(factor * meters)) <= np.log(LIKE)
+    ]
+    meant = f": they may be {' or '.join(likely)}" if likely else ""
+    return Finding(
+        "units",
+        f"objects would be {factor:.2g} times as large as usual ({shown}) if the positions of the "
+        f"poses were meters{meant}",
     )
 
 
