@@ -61,6 +61,17 @@ def test_where_data_do_not_carry_an_answer_it_is_said():
     assert [reason for _, reason in found.unknown] == ["seen in 3 images, 4 are needed"]
 
 
+def test_of_what_is_never_seen_at_its_whole_height_nothing_is_said():
+    """A parked car beside the camera, whose boxes end at the right and at the lower border."""
+    street = make_street("oncoming", 3)
+    rows = np.where(street.recording.detections.object_id == 3, -1, 0)
+    found = estimate_tracks(
+        street.recording, street.path, street.ellipsoids[:1], rows, final=True, box_noise=NOISE
+    )
+    assert found.tracks == ()
+    assert found.unknown[0][1] == "its whole height is seen in 0 images, 4 are needed"
+
+
 def test_a_track_is_in_the_images_that_show_it_and_includes_the_path():
     street = make_street("following", 1)
     (track,) = tracked(street).tracks

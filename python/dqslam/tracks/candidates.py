@@ -75,6 +75,13 @@ class Scene:
         classes, counts = np.unique(detections.class_id[rows], return_counts=True)
         return detections.class_names[int(classes[np.argmax(counts)])]
 
+    def whole_heights(self, rows: Ints) -> int:
+        """Return how many of some boxes have an upper and a lower edge that is not cut.
+
+        Where a thing is follows from its height in the image; elsewhere a start may be far off.
+        """
+        return int(np.sum(~self.recording.detections.truncated[rows][:, [1, 3]].any(axis=1)))
+
     def size(self, class_name: str) -> BodySize | None:
         """Return the size of a class, where it is known."""
         return body_size(class_name, self.size_prior)

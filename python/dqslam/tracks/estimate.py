@@ -94,6 +94,9 @@ def _judge(scene: Scene, rows: Ints, path_covariance: PathCovariance) -> Judgmen
     """Judge what some boxes (b,) show; or say why that cannot be done."""
     if len(rows) < FEWEST_IMAGES:
         return f"seen in {len(rows)} images, {FEWEST_IMAGES} are needed"
+    whole = scene.whole_heights(rows)
+    if whole < FEWEST_IMAGES:
+        return f"its whole height is seen in {whole} images, {FEWEST_IMAGES} are needed"
     class_name = scene.class_name(rows)
     size = scene.size(class_name)
     if size is None:

@@ -78,7 +78,7 @@ def _judge(scene: Scene, rows: Ints, path_covariance: PathCovariance) -> Judgmen
     rows = thinned(one_an_image(scene.recording, rows))
     class_name = scene.class_name(rows)
     size = scene.size(class_name)
-    if size is None or len(rows) < FEWEST_IMAGES:
+    if size is None or scene.whole_heights(rows) < FEWEST_IMAGES:
         return None
     path = path_covariance(scene.recording.detections.pose[rows])
     return judge(scene.problem(rows, size, class_name), path)
