@@ -13,6 +13,7 @@ from dqslam.association.refine import reassign
 from dqslam.association.tracklets import link_tracklets
 from dqslam.assumptions import BoxNoise, OdometryNoise
 from dqslam.metrics import score_association
+from dqslam.online import OnlineSlam, replay
 from scenes import Thing, film, map_truly, orbit_poses
 from test_association_tracklets import recording
 
@@ -129,6 +130,22 @@ def test_looks_raise_purity_and_recall_among_objects_of_one_class(seed, least_ga
     assert after.purity >= 0.99
     assert after.recall >= before.recall + 0.1
     assert (after.found, after.split, after.invented) == (12, 0, 0)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_looks_raise_purity_in_sessions(seed):
+    made = crowd(seed)
+    detections = replace(made.recording.detections, embedding=noisy_looks(made, seed))
+    results = []
+    for one in (made.recording, replace(made.recording, detections=detections)):
+        slam = OnlineSlam(one.camera, trust_ids=0.9, box_noise=BoxNoise(1.5, 0.02))
+        for _ in replay(slam, one):
+            pass
+        shown = np.concatenate(slam.assignments)
+        results.append(score_association(detections.pose, shown, made.thing))
+    before, after = results
+    assert after.purity >= max(before.purity + 0.05, 0.95)
+    assert after.recall >= before.recall + 0.1
 
 
 def test_probabilities_of_classes_follow_the_confidences():

@@ -4,7 +4,12 @@ from scipy.spatial.transform import Rotation
 
 from dqslam import Detections, Odometry, PoseModel, Recording
 from dqslam.association import link_tracklets
-from dqslam.association.keyframes import MIN_GROWTH, MIN_PARALLAX, choose_keyframes
+from dqslam.association.keyframes import (
+    MIN_GROWTH,
+    MIN_PARALLAX,
+    _quantile,
+    choose_keyframes,
+)
 from scenes import CAMERA, Thing, film, street_poses
 
 STILL = np.array([0, 0, 0, 0, 0, 0, 1.0])
@@ -153,3 +158,9 @@ def test_a_quarter_of_the_tracklets_may_stay():
     far = [Thing(np.array([0.0, -300.0, 1000.0]), np.full(3, 30.0))]
     assert seen(poses, near + far).tolist() == [0, 5, 10]
     assert seen(poses, near[:1] + 3 * far).tolist() == [0]
+
+
+@pytest.mark.parametrize("count", [1, 2, 5, 8])
+def test_quantiles_are_those_of_numpy(count):
+    values = np.random.default_rng(count).normal(size=count)
+    assert _quantile(values, 0.75) == pytest.approx(np.quantile(values, 0.75), rel=1e-12)

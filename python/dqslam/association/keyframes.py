@@ -48,11 +48,19 @@ class KeyframeChooser:
             angle = np.arccos(np.clip(cosine, -1.0, 1.0))
             growth = np.abs(np.log(rays.half_width[known] / width))
             change = np.hypot(angle / MIN_PARALLAX, growth / np.log1p(MIN_GROWTH))
-            if np.quantile(change, MAX_SHARE_UNCHANGED) < 1.0:
+            if _quantile(change, MAX_SHARE_UNCHANGED) < 1.0:
                 return False
         self._direction = dict(zip(numbers, rays.direction, strict=True))
         self._half_width = dict(zip(numbers, rays.half_width.tolist(), strict=True))
         return True
+
+
+def _quantile(values: Floats, share: float) -> float:
+    """Return a quantile of some numbers as ``np.quantile`` does, which takes long for a few."""
+    ordered = sorted(values.tolist())
+    below, part = divmod(share * (len(ordered) - 1), 1.0)
+    low, high = ordered[int(below)], ordered[min(int(below) + 1, len(ordered) - 1)]
+    return float(low + part * (high - low))
 
 
 def choose_keyframes(recording: Recording, tracklets: Ints) -> Ints:
