@@ -12,7 +12,6 @@ from typing import Annotated
 
 import numpy as np
 import typer
-from scipy.spatial.transform import Rotation
 
 import dqslam as dq
 from dqslam import io
@@ -66,6 +65,8 @@ def _load(folder: Path, odometry: str, boxes: str, ids: str, camera: Path) -> dq
 
 def ycb(scene: str) -> Case:
     """Return a table of YCB-Video, whose truth is in another world than its odometry."""
+    from scipy.spatial.transform import Rotation
+
     folder = _FOLDER / "ycbv_orbslam3" / scene
     poses = [
         io.read_trajectory(folder / name).world_from_camera[:, 3:]
@@ -100,6 +101,8 @@ def ycb(scene: str) -> Case:
 
 def lmo(detector: str) -> Case:
     """Return the table of LM-O at its true poses; two of its objects were moved by hand."""
+    from scipy.spatial.transform import Rotation
+
     folder = _FOLDER / "bop_lmo" / "seg_0703_1001"
     boxes = f"detections_{detector}.csv"
     recording = _load(folder, "groundtruth.txt", boxes, "class_id", folder.parent)

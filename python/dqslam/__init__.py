@@ -66,7 +66,6 @@ if TYPE_CHECKING:  # the one list of public names, a line each: lazy_exports rea
     from dqslam.calibration import solve_with_calibration as solve_with_calibration
     from dqslam.estimate import Estimate as Estimate
     from dqslam.evaluation import evaluate_results as evaluate_results
-    from dqslam.pose_graphs import pose_graph as pose_graph
     from dqslam.graph import Graph as Graph
     from dqslam.graph import build_graph as build_graph
     from dqslam.graph import solve as solve
@@ -115,6 +114,7 @@ if TYPE_CHECKING:  # the one list of public names, a line each: lazy_exports rea
     from dqslam.places.locate import locate as locate
     from dqslam.places.locate_map import PlaceMap as PlaceMap
     from dqslam.plot import plot_maps as plot_maps
+    from dqslam.pose_graphs import pose_graph as pose_graph
     from dqslam.recording import AbsolutePositions as AbsolutePositions
     from dqslam.recording import Detections as Detections
     from dqslam.recording import LoopClosures as LoopClosures

@@ -54,9 +54,17 @@ def test_a_table_by_hand(tmp_path):
     )
 
 
+def test_up_may_be_uncertain(tmp_path):
+    rules = load_placements(written(tmp_path, "up_sigma_deg = 9\n" + TABLE))
+    assert rules.up == (0.0, -1.0, 0.0)
+    assert rules.up_sigma == pytest.approx(np.pi / 20)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
+        ("up = [0, -2, 0]", "up_sigma_deg = 0", r":2: .*up_sigma_deg"),
+        ("up = [0, -2, 0]", "up_sigma_deg = 91", r":2: .*up_sigma_deg"),
         ('on = "plane"', "", r":4: .*needs one of on, beside, aligned_with, upright, has none"),
         ("within_m = 0.6\n", "", r":12: .*within_m goes with beside"),
         ("sigma_deg = 9", "sigma_m = 9", r":18: .*the sigma of aligned_with is sigma_deg"),

@@ -4,8 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import dqslam as dq
+from dqslam import _core
 from dqslam.metrics import true_rows
 from dqslam.pipeline.placement_report import warn_of_placements
 
@@ -53,6 +55,33 @@ def test_objects_on_a_table(table, mode):
     assert (moved == 0.0) == (mode == dq.Mode.MAPPING)
 
 
+def in_the_frame_of_the_first_camera(recording, truth):
+    """The same table in a world whose axes are those of the first camera."""
+    first = _core.world_from_camera(dq.PoseModel.SE3, recording.camera, truth.poses[:1])
+    inverse = _core.inverse(dq.PoseModel.SE3, first)
+    back = np.repeat(inverse, len(truth.poses), axis=0)
+    poses = _core.compose(dq.PoseModel.SE3, back, truth.poses)
+    odometry = replace(recording.odometry, first_pose=poses[0])
+    up = Rotation.from_quat(inverse[0, 3:]).apply([0.0, 0.0, 1.0])
+    return replace(recording, odometry=odometry), up
+
+
+def test_up_is_estimated_in_the_frame_of_a_camera(table):
+    recording, up = in_the_frame_of_the_first_camera(*table)
+    options = dq.RunOptions(trust_ids=1.0, placements=ON_A_PLANE)
+    result = dq.run(recording, options)
+    found = result.report["placements"]
+    off = np.degrees(np.arccos(np.dot(found["up"], up)))
+    assert off < 3.0 * found["up_sigma_deg"] < 15.0
+    (plane,) = found["planes"]
+    assert len(plane["object_ids"]) >= 6
+    # Where it is told, it is not estimated.
+    told = replace(ON_A_PLANE, up=tuple(up.tolist()))
+    found = dq.run(recording, replace(options, placements=told)).report["placements"]
+    assert found["up"] == pytest.approx(up)
+    assert found["up_sigma_deg"] is None
+
+
 def test_unknown_classes_are_named(table):
     rules = dq.PlacementRules((dq.PlacementRule("on", "unicorn", "plane"),))
     with pytest.raises(ValueError, match="no class 'unicorn' in the recording"):
@@ -67,6 +96,10 @@ def test_rules_that_do_not_hold_are_warned_of():
     assert warn_of_placements({"planes": [], "placements": rows}) == [
         "only 1 of 3 placements hold: are the rules, and up, right?"
     ]
+    wide = {"planes": [], "placements": rows[:2], "up_sigma_deg": 11.6}
+    (warning,) = warn_of_placements(wide)
+    assert "the direction up is known to 12 degrees only" in warning
+    assert warn_of_placements(wide | {"up_sigma_deg": 4.9}) == []
     assert warn_of_placements({"planes": [], "placements": []}) == [
         "no rule of placement holds for any object of the map"
     ]

@@ -45,7 +45,7 @@ class RunOptions:
     cuboid or a cylinder where that predicts boxes better that took no part. None is ELLIPSOID."""
     placements: PlacementRules | None = None
     """Where objects of a class are, as ``load_placements`` reads it. Up is z unless the
-    rules say another direction, or the cameras are held in another way."""
+    rules say another direction, or the cameras are held in another way; then it is estimated."""
     estimates_noise: bool = False
     """Whether the level of the odometry's noise is estimated instead of believed."""
     estimate: tuple[str, ...] = ()

@@ -10,7 +10,6 @@ from dqslam.assumptions import PlacementRules
 from dqslam.estimate import Estimate
 from dqslam.placements import Placements
 
-
 # Above this, objects of a table's size tell little more of their heights than without a plane.
 WIDE_UP_DEG = 5.0
 
