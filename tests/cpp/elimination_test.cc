@@ -129,6 +129,7 @@ TEST(Elimination, SubtreesAreApart) {
       }
     }
     const Front& last = elimination.fronts[end - 1];
+    EXPECT_EQ(last.update, 0);
     EXPECT_GE(elimination.fronts[end].factor, last.factor + last.rows() * last.pivots + 3);
   }
 }

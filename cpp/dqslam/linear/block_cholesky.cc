@@ -30,7 +30,8 @@ BlockCholesky::BlockCholesky(const BlockMatrix& A, int threads)
     : elimination_(A),
       threads_(threads),
       factor_(elimination_.fronts.back().factor + kFrontPadding) {
-  for (const std::ptrdiff_t size : elimination_.stack_size) stacks_.emplace_back(size);
+  stacks_.resize(elimination_.stack_size.size());
+  for (int s = 0; s < 2; ++s) stacks_[s].resize(elimination_.stack_size[s]);
   for (int f = 0; f < elimination_.num_fronts(); ++f) {
     if (elimination_.fronts[f].stack < 2) others_.push_back(f);
   }
@@ -54,9 +55,16 @@ bool BlockCholesky::Factorize(const BlockMatrix& A, const VectorXd& damping) {
   std::atomic<bool> positive{true};
   ParallelFor(threads_, subtrees, [&](int s) {
     const auto [begin, end] = elimination_.subtrees[s];
+    for (const int stack : {2 * s + 2, 2 * s + 3}) {
+      stacks_[stack].resize(elimination_.stack_size[stack]);
+    }
     for (int f = begin; f < end && positive; ++f) {
       if (!Eliminate(A, placed_damping, f)) positive = false;
     }
+    // Only the update of the last front waits on, at the bottom of its stack.
+    const Front& last = elimination_.fronts[end - 1];
+    stacks_[last.stack].conservativeResize(std::ptrdiff_t{last.below} * last.below);
+    stacks_[last.stack ^ 1].resize(0);
   });
   return positive && std::all_of(others_.begin(), others_.end(), [&](int f) {
            return Eliminate(A, placed_damping, f);
