@@ -60,7 +60,8 @@ def up_of(
     )
     count = len(estimate.object_ids)
     covariance = np.zeros((count, 9, count, 9))
-    covariance[np.ix_(known, range(9), known, range(9))] = joint.reshape(len(known), 9, -1, 9)
+    numbers = np.arange(9)
+    covariance[np.ix_(known, numbers, known, numbers)] = joint.reshape(len(known), 9, -1, 9)
     for row in known.tolist():  # wider than its block where an object is contradicted
         covariance[row, :, row] = marginals.objects[row]
     return estimate_up(estimate, covariance.reshape(9 * count, 9 * count), supported, prior)
