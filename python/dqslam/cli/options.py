@@ -25,12 +25,16 @@ FromTime = Annotated[
     typer.Option(
         "--from",
         metavar="SECONDS",
-        help="Leave out what is before this time, by the clock of the poses.",
+        help="Leave out what is before this time, in seconds of the clock of the poses. "
+        "Default: nothing.",
     ),
 ]
 UntilTime = Annotated[
     float | None,
-    typer.Option(metavar="SECONDS", help="Leave out what is after this time, by the same clock."),
+    typer.Option(
+        metavar="SECONDS",
+        help="Leave out what is after this time, in seconds of the same clock. Default: nothing.",
+    ),
 ]
 ResultDirectory = Annotated[
     Path,

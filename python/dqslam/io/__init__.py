@@ -9,6 +9,7 @@ from dqslam.io.convert import Written as Written
 from dqslam.io.convert import convert as convert
 from dqslam.io.detections import DETECTION_FORMATS as DETECTION_FORMATS
 from dqslam.io.detections import DetectionTable as DetectionTable
+from dqslam.io.detections import OtherClasses as OtherClasses
 from dqslam.io.detections import read_class_names as read_class_names
 from dqslam.io.detections import read_detections as read_detections
 from dqslam.io.extras import Extras as Extras

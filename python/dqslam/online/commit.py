@@ -43,6 +43,10 @@ def commit(state: State, local: LocalMap) -> Ints:
     store.labels = after
     named = state.settings.trust == FINAL
     ids = [store.tracker_id_of(row) if named else ANY_ID for row in rows[new].tolist()]
+    for one in ids:  # an object that was given up leaves its id to the one that takes its boxes
+        row = state.registry.row_of.get(one)
+        if row is not None and not (after.object_rows == row).any():
+            state.registry.release(one)
     state.registry.register(ids)
     store.size_prior = scene.size_prior
     if scene.odometry_noise not in (None, store.odometry_noise):

@@ -74,7 +74,16 @@ class Registry:
         """Add objects by their ids. One whose id another has already gets a free one."""
         for one in ids:
             is_free = one != ANY_ID and one not in self.row_of
-            name = one if is_free else ObjectId(max(self.ids, default=-1) + 1)
+            name = one if is_free else self._free_id()
             self.row_of[name] = ObjectRow(len(self.ids))
             self.ids.append(name)
             self.votes.append(Counter())
+
+    def release(self, one: ObjectId) -> None:
+        """Give the object with an id another one, so that the id is free."""
+        row = self.row_of.pop(one)
+        self.ids[row] = self._free_id()
+        self.row_of[self.ids[row]] = row
+
+    def _free_id(self) -> ObjectId:
+        return ObjectId(max(self.ids, default=-1) + 1)

@@ -45,11 +45,12 @@ def estimate_online(
         progress(len(slam) / len(recording.timestamps), _describe_step(slam, frame))
     live_poses = slam.poses
     summary = slam.polish().result().summary
-    object_id = recording.detections.object_id.copy()
     is_final = options.trust_ids == FINAL
-    if not is_final:
-        order = np.argsort(recording.detections.pose, kind="stable")
-        object_id[order] = np.concatenate(slam.assignments)
+    given = recording.detections.object_id
+    order = np.argsort(recording.detections.pose, kind="stable")
+    found = np.full(len(given), -1)
+    found[order] = np.concatenate(slam.assignments)
+    object_id = np.where(found < 0, given, found) if is_final else found
     shown = replace(recording, detections=replace(recording.detections, object_id=object_id))
     estimate = _estimate(slam, recording) if is_final else slam.estimate()
     believed = _with_believed_noise(slam, shown)

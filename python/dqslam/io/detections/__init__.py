@@ -12,6 +12,7 @@ from dqslam.io.detections.flat import JSON_LINES, SUPERVISION
 from dqslam.io.detections.kitti_labels import KITTI_OBJECTS, KITTI_TRACKING
 from dqslam.io.detections.mot import MOT
 from dqslam.io.detections.oaslam import OASLAM
+from dqslam.io.detections.other_classes import OtherClasses
 from dqslam.io.detections.overlap import doubt_doubles, suppress
 from dqslam.io.detections.rosbag import ARRAYS
 from dqslam.io.detections.table import DetectionTable, checked
@@ -22,7 +23,13 @@ from dqslam.io.frames import FrameTimes
 from dqslam.io.notes import Notes
 from dqslam.io.rosbag import check_topic
 
-__all__ = ["DETECTION_FORMATS", "DetectionTable", "read_class_names", "read_detections"]
+__all__ = [
+    "DETECTION_FORMATS",
+    "DetectionTable",
+    "OtherClasses",
+    "read_class_names",
+    "read_detections",
+]
 
 # A folder, and a JSON file, is of the first of these that it looks like.
 DETECTION_FORMATS = (
