@@ -16,6 +16,7 @@ import typer
 import dqslam as dq
 from dqslam import io
 from dqslam._checks import Floats
+from dqslam.io.recording import Ids
 
 _FOLDER = Path(os.environ.get("DQSLAM_REALDATA", "../shared/realdata"))
 YCB = ("0049", "0051", "0053", "0055", "0057", "0059")
@@ -57,7 +58,7 @@ def _numbers(row: dict[str, str], names: str) -> Floats:
     return np.array([float(row[name]) for name in names.split()])
 
 
-def _load(folder: Path, odometry: str, boxes: str, ids: str, camera: Path) -> dq.Recording:
+def _load(folder: Path, odometry: str, boxes: str, ids: Ids, camera: Path) -> dq.Recording:
     return io.load_recording(
         camera / "camera.json", folder / odometry, folder / boxes, ids=ids, min_score=0.5
     )[0]

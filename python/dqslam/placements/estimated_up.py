@@ -59,8 +59,8 @@ def up_of(
         mapped_part(graph, estimate), options, state_of(estimate), [], known.tolist()
     )
     count = len(estimate.object_ids)
-    covariance = np.zeros((count, 9, count, 9))
-    covariance[np.ix_(known, range(9), known, range(9))] = joint.reshape(len(known), 9, -1, 9)
+    covariance, nine = np.zeros((count, 9, count, 9)), np.arange(9)
+    covariance[np.ix_(known, nine, known, nine)] = joint.reshape(len(known), 9, -1, 9)
     for row in known.tolist():  # wider than its block where an object is contradicted
         covariance[row, :, row] = marginals.objects[row]
     return estimate_up(estimate, covariance.reshape(9 * count, 9 * count), supported, prior)

@@ -56,7 +56,8 @@ def height_sigmas(gradients: Floats, covariances: Floats) -> Floats:
 
     From their gradients (o, 9) and the covariances of the objects (o, 9, 9).
     """
-    return np.sqrt(np.einsum("ni,nij,nj->n", gradients, covariances, gradients).clip(min=0.0))
+    variances = np.einsum("ni,nij,nj->n", gradients, covariances, gradients)
+    return np.asarray(np.sqrt(variances.clip(min=0.0)))
 
 
 def tangents(up: Floats) -> Floats:
