@@ -16,6 +16,7 @@ import typer
 import dqslam as dq
 from dqslam import io
 from dqslam._checks import Floats
+from dqslam.io.recording import Ids
 
 Ids = Literal["track_id", "class_id"]
 _FOLDER = Path(os.environ.get("DQSLAM_REALDATA", "../shared/realdata"))
