@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import numpy as np
 import typer
@@ -18,7 +18,6 @@ from dqslam import io
 from dqslam._checks import Floats
 from dqslam.io.recording import Ids
 
-Ids = Literal["track_id", "class_id"]
 _FOLDER = Path(os.environ.get("DQSLAM_REALDATA", "../shared/realdata"))
 YCB = ("0049", "0051", "0053", "0055", "0057", "0059")
 TABLE = (dq.PlacementRule("on", None, "plane", 0.01),)
