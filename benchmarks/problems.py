@@ -167,10 +167,10 @@ def _truth(poses: Floats, center: Floats, yaw: Floats) -> Truth:
     return Truth(
         pose_model=PoseModel.SE2,
         poses=poses,
-        object_id=np.arange(len(center)),
-        center=center,
-        volume=np.full(len(center), 4.0 / 3.0 * np.pi * _RADII_M.prod()),
-        class_name=("ellipsoid",) * len(center),
+        object_ids=np.arange(len(center)),
+        centers=center,
+        volumes=np.full(len(center), 4.0 / 3.0 * np.pi * _RADII_M.prod()),
+        class_names=("ellipsoid",) * len(center),
         ellipsoids=np.array([_core.ellipsoid_from_axes(c, _RADII_M, q) for c, q in rows]),
     )
 
@@ -184,7 +184,7 @@ def _exact_boxes(
     for area in range(area_of_pose[-1] + 1):  # an object is seen from its area and those beside
         near = np.flatnonzero(np.abs(area_of_pose - area) <= 1)
         rows = np.arange(area * objects, (area + 1) * objects)
-        pairs, columns = np.nonzero(_in_view(camera, truth.poses[near], truth.center[rows]))
+        pairs, columns = np.nonzero(_in_view(camera, truth.poses[near], truth.centers[rows]))
         pose, row = near[pairs], rows[columns]
         box, in_front = _core.project_to_boxes(
             PoseModel.SE2, camera, truth.poses[pose], truth.ellipsoids[row]
@@ -211,16 +211,16 @@ def _in_view(camera: Camera, poses: Floats, centers: Floats) -> Bools:
 
 def _near_centers(recording: Recording, truth: Truth, random: Generator) -> Floats:
     """Return Problem.peer_centers."""
-    noise = _START_SIGMA_M * random.normal(size=truth.center.shape)
+    noise = _START_SIGMA_M * random.normal(size=truth.centers.shape)
     seen, first = np.unique(recording.detections.object_id, return_index=True)
     pose = recording.detections.pose[first]  # boxes are in the order of poses
     odometry = recording.odometry
     reckoned = _core.dead_reckon(odometry.pose_model, odometry.first_pose, odometry.relative)[pose]
     true = truth.poses[pose]
-    rows = np.searchsorted(truth.object_id, seen)
+    rows = np.searchsorted(truth.object_ids, seen)
     turn = reckoned[:, 2] - true[:, 2]
-    from_robot = truth.center[rows, :2] - true[:, :2]
-    center = truth.center[rows].copy()
+    from_robot = truth.centers[rows, :2] - true[:, :2]
+    center = truth.centers[rows].copy()
     center[:, 0] = (
         reckoned[:, 0] + np.cos(turn) * from_robot[:, 0] - np.sin(turn) * from_robot[:, 1]
     )

@@ -35,7 +35,7 @@ def score(problem: Problem, poses: Floats, dual_quadrics: Floats) -> Score:
         model, problem.recording.camera, poses[boxes.pose[real]], ellipsoids[object_row[real]]
     )
     error = (predicted - boxes.box[real])[in_front]
-    centers = truth.center[np.searchsorted(truth.object_id, seen)]
+    centers = truth.centers[np.searchsorted(truth.object_ids, seen)]
     return Score(
         rmse_m=_root_mean_square(position - true_position),
         aligned_rmse_m=_root_mean_square(aligned - true_position),

@@ -39,7 +39,7 @@ for axes, (name, estimate) in zip(panels, estimates.items(), strict=True):
     axes.plot(*estimate.initial_poses[:, :2].T, color="#0072B2", linewidth=1, label="odometry")
     axes.plot(*truth.poses[:, :2].T, color="#009E73", linewidth=3, alpha=0.7, label="truth")
     axes.plot(*estimate.poses[:, :2].T, color="#D55E00", linewidth=1.2, label="estimate")
-    axes.plot(*truth.center[:, :2].T, "s", color="#009E73", alpha=0.5)
+    axes.plot(*truth.centers[:, :2].T, "s", color="#009E73", alpha=0.5)
     axes.plot(*estimate.centers[:, :2].T, "+", color="#D55E00")
     axes.set_title(f"{name}: {report.rmse_pos:.2f} m", fontsize=10)
     axes.set(aspect="equal", xlabel="x [m]", xlim=(-13, 16), ylim=(-7, 17))

@@ -47,7 +47,7 @@ else:
     detections = replace(recording.detections, object_id=without_ids)
     recording = replace(recording, detections=detections, positions=None)
     poses = truth.poses
-    true_centers = truth.center
+    true_centers = truth.centers
 print(f"{len(recording.timestamps)} views, {len(recording.detections)} boxes, no ids")
 
 # %%

@@ -40,7 +40,7 @@ u, v = np.meshgrid(np.arange(camera.width), np.arange(camera.height))
 rays = np.stack(
     [(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, np.ones(u.shape)], axis=-1
 )
-true = replace(estimate, object_ids=truth.object_id, ellipsoids=truth.ellipsoids)
+true = replace(estimate, object_ids=truth.object_ids, ellipsoids=truth.ellipsoids)
 axes, turns = true.semi_axes, Rotation.from_quat(true.orientations).as_matrix()
 cameras = dq._core.world_from_camera(truth.pose_model, camera, truth.poses)
 
@@ -50,7 +50,7 @@ def depth_at(pose):
     turn, origin = Rotation.from_quat(pose[3:]).as_matrix(), pose[:3]
     down = rays @ turn[2]
     depth = np.where(down < 0, -origin[2] / down, np.inf)
-    for center, semi_axes, own in zip(truth.center, axes, turns, strict=True):
+    for center, semi_axes, own in zip(truth.centers, axes, turns, strict=True):
         d, o = rays @ turn.T @ own / semi_axes, (origin - center) @ own / semi_axes
         a, b = (d * d).sum(-1), d @ o
         inside = b * b - a * (o @ o - 1)
@@ -73,13 +73,13 @@ depth = dq.DepthImages.from_arrays(
 found = dq.fuse_surfaces(results, depth)
 print(found)
 for one in found.surfaces:
-    row = truth.object_id.tolist().index(one.object_id)
-    point = (one.to_world(one.vertices) - truth.center[row]) @ turns[row] / axes[row]
+    row = truth.object_ids.tolist().index(one.object_id)
+    point = (one.to_world(one.vertices) - truth.centers[row]) @ turns[row] / axes[row]
     radius = np.linalg.norm(point, axis=1)
     error = (radius - 1) * radius / np.linalg.norm(point / axes[row], axis=1)
     print(
         f"{one.object_id}: {100 * one.seen_share:.0f}% seen, median error "
-        f"{1e3 * np.median(np.abs(error)):.1f} mm, volume {one.volume / truth.volume[row]:.3f} "
+        f"{1e3 * np.median(np.abs(error)):.1f} mm, volume {one.volume / truth.volumes[row]:.3f} "
         "of the true one"
     )
 
@@ -108,8 +108,8 @@ def seen_from(poses, centers):
     return np.einsum("pji,pj->pi", own, centers[row] - poses[positions.pose, :3])
 
 
-same = np.searchsorted(truth.object_id, results.objects.object_ids)
-expected = seen_from(cameras, truth.center[same])
+same = np.searchsorted(truth.object_ids, results.objects.object_ids)
+expected = seen_from(cameras, truth.centers[same])
 for name, one in (
     ("estimated from boxes", seen_from(results.poses, results.objects.centers)),
     ("measured by depth", positions.object_in_robot),

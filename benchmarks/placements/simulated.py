@@ -26,7 +26,7 @@ def errors(estimate: dq.Estimate, truth: dq.Truth) -> tuple[float, float]:
     axes = 2 if truth.pose_model == dq.PoseModel.SE2 else 3
     poses = np.linalg.norm(estimate.poses[:, :axes] - truth.poses[:, :axes], axis=1)
     rows = true_rows(estimate.object_ids, truth)
-    centers = np.linalg.norm(estimate.centers - truth.center[rows], axis=1)
+    centers = np.linalg.norm(estimate.centers - truth.centers[rows], axis=1)
     return float(poses.mean()), float(centers.mean())
 
 

@@ -64,11 +64,11 @@ def _merge(seed: int, a: Robot, b: Robot, directory: Path, *, solves: bool) -> T
     maps = [_landmarks(one, directory / str(row), solves=solves) for row, one in enumerate((a, b))]
     single = tuple(float(_errors(one).mean()) for one in (a, b))
     honest = tuple(
-        _nees(one.centers - robot.truth.center[one.object_ids], one.covariances)
+        _nees(one.centers - robot.truth.centers[one.object_ids], one.covariances)
         for one, robot in zip(maps, (a, b), strict=True)
     )
     alone = [
-        _apart(one.estimate.centers, one.truth.center[one.estimate.object_ids]) for one in (a, b)
+        _apart(one.estimate.centers, one.truth.centers[one.estimate.object_ids]) for one in (a, b)
     ]
     nothing = Trial(
         seed,
@@ -88,14 +88,14 @@ def _merge(seed: int, a: Robot, b: Robot, directory: Path, *, solves: bool) -> T
     found = merged.parts[1].alignment
     assert found is not None
     truth = true_motion(a, b)
-    both = a.truth.center[np.intersect1d(a.estimate.object_ids, b.estimate.object_ids)]
+    both = a.truth.centers[np.intersect1d(a.estimate.object_ids, b.estimate.object_ids)]
     turn = (found.b_from_a @ np.linalg.inv(truth))[:2, 0]
     apart = both @ (found.b_from_a - truth)[:3, :3].T + (found.b_from_a - truth)[:3, 3]
     true_of: dict[int, int] = {}
     for part in reversed(merged.parts):  # an object of both is that of the first map
         true_of |= dict(zip(part.merged_ids.tolist(), part.object_ids.tolist(), strict=True))
     true_ids = [true_of[one] for one in merged.landmarks.object_ids.tolist()]
-    errors = merged.landmarks.centers - a.truth.center[true_ids]
+    errors = merged.landmarks.centers - a.truth.centers[true_ids]
     ids_of_a = dict(zip(merged.parts[0].merged_ids, merged.parts[0].object_ids, strict=True))
     pairs = [
         (own, ids_of_a[here])
@@ -108,7 +108,7 @@ def _merge(seed: int, a: Robot, b: Robot, directory: Path, *, solves: bool) -> T
         back = np.linalg.inv(part.merged_from_map)
         own = np.isin(merged.landmarks.object_ids, part.merged_ids)
         there = centers[own] @ back[:3, :3].T + back[:3, 3]
-        own_truth = robot.truth.center[true_rows[own]]
+        own_truth = robot.truth.centers[true_rows[own]]
         at.append(float(np.linalg.norm(there - own_truth, axis=1).mean()))
         aligned.append(_apart(there, own_truth))
     right = sum(own == other for own, other in pairs)
@@ -123,7 +123,7 @@ def _merge(seed: int, a: Robot, b: Robot, directory: Path, *, solves: bool) -> T
         merged_m=float(np.linalg.norm(errors, axis=1).mean()),
         merged_at=(at[0], at[1]),
         merged_aligned=(aligned[0], aligned[1]),
-        merged_all_aligned=_apart(centers, a.truth.center[true_rows]),
+        merged_all_aligned=_apart(centers, a.truth.centers[true_rows]),
     )
 
 
@@ -135,7 +135,7 @@ def _apart(centers: Floats, truth: Floats) -> float:
 
 def _errors(robot: Robot) -> Floats:
     ids = robot.estimate.object_ids
-    error = robot.estimate.centers - robot.truth.center[ids]
+    error = robot.estimate.centers - robot.truth.centers[ids]
     return np.asarray(np.linalg.norm(error, axis=1))
 
 

@@ -72,7 +72,7 @@ def two_robots(
 
 def true_motion(a: Robot, b: Robot) -> Floats:
     """Return b_from_a (4, 4) from the places of the objects, which both worlds have in order."""
-    p, q = a.truth.center, b.truth.center
+    p, q = a.truth.centers, b.truth.centers
     moment = (q - q.mean(axis=0)).T @ (p - p.mean(axis=0))
     yaw = np.arctan2(moment[1, 0] - moment[0, 1], moment[0, 0] + moment[1, 1])
     motion = np.eye(4)

@@ -53,7 +53,7 @@ def draw_image(axes, recording, truth, pose, now, ellipsoids):
 def draw_map(axes, truth, drift, path, ellipsoids):
     """Draw the map from above, up to now."""
     count = len(path)
-    for place, ellipsoid in zip(truth.center, truth.ellipsoids, strict=True):
+    for place, ellipsoid in zip(truth.centers, truth.ellipsoids, strict=True):
         shape = _core.ellipsoid_shapes(ellipsoid[None])[0]
         axes.fill(*outline(place[:2], shape[:2, :2]), color=TRUTH, alpha=0.35, linewidth=0)
     axes.plot(*truth.poses[:count, :2].T, color=TRUTH, linewidth=3.0, alpha=0.6)

@@ -31,7 +31,7 @@ def paint_image(truth, camera, pose):
     seen_from = _core.world_from_camera(truth.pose_model, camera, truth.poses[[pose]])
     here = np.repeat(truth.poses[[pose]], len(truth.ellipsoids), axis=0)
     outlines = _core.project_to_outlines(truth.pose_model, camera, here, truth.ellipsoids)
-    distance = np.linalg.norm(truth.center - seen_from[:, :3], axis=1)
+    distance = np.linalg.norm(truth.centers - seen_from[:, :3], axis=1)
     for row in np.argsort(-distance):
         if np.isnan(outlines[row]).any():
             continue

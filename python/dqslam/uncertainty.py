@@ -149,7 +149,7 @@ def true_state(graph: Graph, truth: Truth, options: SolveOptions) -> _core.State
     Objects that are not ellipsoids, or that do not exist, are mapped at the true poses. All have
     the parameters of the ellipsoid model.
     """
-    exists = np.isin(graph.object_ids, truth.object_id)
+    exists = np.isin(graph.object_ids, truth.object_ids)
     if truth.ellipsoids is not None and exists.all():
         return _core.State(truth.poses, truth.ellipsoids[true_rows(graph.object_ids, truth)])
     at_truth = rebuilt(graph.core, initial_poses=truth.poses)

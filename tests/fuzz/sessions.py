@@ -62,7 +62,7 @@ def _mutated(step: dq.Step, rng: random.Random) -> dq.Step:
 def _bits(slam: OnlineSlam) -> Any:
     objects = slam.objects
     arrays = (slam.poses, slam.timestamps, objects.object_ids, objects.ellipsoids, slam.keyframes)
-    return [one.tobytes() for one in (*arrays, *slam.assignments)], slam.left_out
+    return [one.tobytes() for one in (*arrays, *slam.assignments)], slam.dropped
 
 
 def try_session(seed: str) -> None:

@@ -62,8 +62,8 @@ def test_the_objects_move_with_the_frame():
     recording, truth, graph = problem("orbit", 0)
     absolute, _ = measured(truth, FRAMES["orbit"], 0)
     estimate, _, _ = dq.solve_with_absolute_positions(graph, absolute)
-    seen = np.isin(truth.object_id, estimate.object_ids)
-    centers = np.column_stack([truth.center[seen], np.zeros((seen.sum(), 3)), np.ones(seen.sum())])
+    seen = np.isin(truth.object_ids, estimate.object_ids)
+    centers = np.column_stack([truth.centers[seen], np.zeros((seen.sum(), 3)), np.ones(seen.sum())])
     frame = np.tile(FRAMES["orbit"], (len(centers), 1))
     expected = _core.compose(dq.PoseModel.SE3, frame, centers)[:, :3]
     assert np.linalg.norm(estimate.centers - expected, axis=1).max() < 0.05

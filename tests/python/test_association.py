@@ -40,10 +40,10 @@ def assert_found(made: Film, found: Association, *, recall=0.9):
     assert result.purity >= 0.98
     assert result.recall >= recall
     assert made.ate(all_poses(made, found)) < 0.5 * made.ate(made.odometry)
-    assert found.left_out == {}
+    assert found.dropped == {}
     # What the ids name is where it should be.
-    for row in np.flatnonzero(found.ids >= 0):
-        shown = made.thing[found.object_id == found.ids[row]]
+    for row in np.flatnonzero(found.object_ids >= 0):
+        shown = made.thing[found.object_id == found.object_ids[row]]
         number = np.bincount(shown[shown >= 0]).argmax()
         error = found.scene.ellipsoids[row, :3] - made.centers[number]
         assert np.linalg.norm(error) < 0.08
@@ -85,9 +85,9 @@ def test_final_ids_are_kept_whatever_the_boxes_say():
     ids[::17] = (ids[::17] + 1) % 8  # wrong, but final
     found = associate(made.with_ids(ids), trust=1.0, estimates_noise=False, box_noise=BOXES)
     np.testing.assert_array_equal(found.object_id, ids)
-    assert set(found.ids.tolist()) == set(range(8))
-    assert found.left_out == {}
-    for row, name in enumerate(found.ids.tolist()):
+    assert set(found.object_ids.tolist()) == set(range(8))
+    assert found.dropped == {}
+    for row, name in enumerate(found.object_ids.tolist()):
         error = np.linalg.norm(found.scene.ellipsoids[row, :3] - made.centers[name])
         assert error < 0.08
 
@@ -98,8 +98,8 @@ def test_final_ids_that_are_not_in_the_map_are_named():
     few = np.flatnonzero(ids == 3)
     ids[few[3:]] = 2
     found = associate(made.with_ids(ids), trust=1.0, estimates_noise=False)
-    assert 3 not in found.ids
-    assert found.left_out[3] == "seen from 3 viewpoints, 4 are needed"
+    assert 3 not in found.object_ids
+    assert found.dropped[3] == "seen from 3 viewpoints, 4 are needed"
 
 
 def drive(seed):
@@ -128,13 +128,13 @@ def test_cars_that_come_towards_us_are_left_out(seed):
     assert result.purity >= 0.98
     shown = {
         name: int(np.bincount(made.thing[found.object_id == name].clip(min=0)).argmax())
-        for name in found.ids[found.ids >= 0].tolist()
+        for name in found.object_ids[found.object_ids >= 0].tolist()
     }
-    in_map = {number for name, number in shown.items() if name not in found.left_out}
+    in_map = {number for name, number in shown.items() if name not in found.dropped}
     assert len(in_map & set(range(12))) >= 9
-    assert {shown[name] for name in found.left_out} <= {12, 13, 14}
-    assert len(found.left_out) >= 2
-    for reason in found.left_out.values():
+    assert {shown[name] for name in found.dropped} <= {12, 13, 14}
+    assert len(found.dropped) >= 2
+    for reason in found.dropped.values():
         assert "the usual one of a car: it moved" in reason
     assert made.ate(all_poses(made, found)) < made.ate(made.odometry)
 
@@ -144,8 +144,8 @@ def test_an_id_of_what_moves_is_left_out_and_said():
     mover = Thing(path[0], np.full(3, 0.05), path=path)
     made = film(orbit_poses(40), [*table_things(7), mover], noise=NOISE)
     found = associate(made.with_ids(), trust=1.0, estimates_noise=False)
-    assert list(found.left_out) == [7]
-    assert "it moved" in found.left_out[7]
+    assert list(found.dropped) == [7]
+    assert "it moved" in found.dropped[7]
     assert made.ate(all_poses(made, found)) < 0.5 * made.ate(made.odometry)
 
 
@@ -270,5 +270,5 @@ def test_one_pose_and_no_boxes(names):
     odometry = Odometry(PoseModel.SE3, np.eye(7)[6], np.zeros((0, 7)), np.zeros((0, 6, 6)))
     made = table(0)
     found = associate(Recording(made.recording.camera, [0.0], odometry, none))
-    assert (found.object_id.shape, found.ids.shape) == ((0,), (0,))
+    assert (found.object_id.shape, found.object_ids.shape) == ((0,), (0,))
     np.testing.assert_array_equal(found.keyframes, [0])

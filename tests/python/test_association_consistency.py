@@ -93,7 +93,7 @@ def test_what_is_joined_is_compared_as_one_from_then_on():
 def test_objects_that_are_left_out_are_not_joined():
     made = film(orbit_poses(20), [Thing(np.zeros(3), BALL)], noise=NOISE)
     scene = estimated(made, halves(made, 0))
-    scene.labels.left_out = {1: "for a reason"}
+    scene.labels.dropped = {1: "for a reason"}
     join_duplicates(scene)
     np.testing.assert_array_equal(scene.labels.box_counts, [10, 10])
 
@@ -205,9 +205,9 @@ def test_an_object_that_moves_along_with_the_camera_is_found(seed):
     assert movers[5].startswith("without it, the path explains its boxes")
     np.testing.assert_array_equal(scene.poses, before[0])
     np.testing.assert_array_equal(scene.ellipsoids, before[1])
-    assert scene.labels.left_out == {}
+    assert scene.labels.dropped == {}
     bent = made.ate(scene.poses)
-    scene.labels.left_out = movers
+    scene.labels.dropped = movers
     scene.estimate(max_iterations=50)
     assert made.ate(scene.poses) < bent
 

@@ -57,14 +57,14 @@ def _covariances(boxes):
 
 
 def test_what_was_left_out_is_not_in_the_graph(found):
-    gone = int(np.flatnonzero(found.ids == 3)[0])
+    gone = int(np.flatnonzero(found.object_ids == 3)[0])
     scene = found.scene
-    before, scene.labels.left_out = scene.labels.left_out, {gone: "it moves"}
+    before, scene.labels.dropped = scene.labels.dropped, {gone: "it moves"}
     graph = found.build_graph()
-    scene.labels.left_out = before
+    scene.labels.dropped = before
     assert graph.object_ids.tolist() == [0, 1, 2, 4, 5, 6, 7]
     start = found.start(graph)
-    rows = [int(np.flatnonzero(found.ids == number)[0]) for number in graph.object_ids]
+    rows = [int(np.flatnonzero(found.object_ids == number)[0]) for number in graph.object_ids]
     np.testing.assert_array_equal(start.landmarks, scene.ellipsoids[rows])
 
 
@@ -79,5 +79,5 @@ def test_nothing_found_is_nothing_to_solve(made):
 def test_an_association_in_a_line(made, found):
     shown = int(np.sum(found.object_id >= 0))
     assert repr(found) == f"Association(8 objects, {shown} of {len(made.thing)} boxes)"
-    left_out = replace(found, left_out={3: "it moves"})
-    assert repr(left_out).endswith("boxes, 1 left out)")
+    dropped = replace(found, dropped={3: "it moves"})
+    assert repr(dropped).endswith("boxes, 1 dropped)")

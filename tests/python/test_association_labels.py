@@ -54,7 +54,7 @@ def test_boxes_of_objects_that_are_given_up_wait(labels):
 
 
 def test_what_is_left_out_takes_no_part(labels):
-    labels.left_out = {0: "for a reason"}
+    labels.dropped = {0: "for a reason"}
     np.testing.assert_array_equal(labels.takes_part, [False, True, False])
 
 
@@ -64,12 +64,12 @@ def test_a_part_is_changed_by_itself(labels):
     part.assign(np.array([2]), np.array([0]))
     part.add_object(np.zeros(0, dtype=np.int64))
     part.cut_tracklet(np.array([1]))
-    part.left_out[1] = "for a reason"
+    part.dropped[1] = "for a reason"
     np.testing.assert_array_equal(labels.object_rows, [0, 0, 0, 1, -1])
     np.testing.assert_array_equal(labels.votes, [[2, 1], [0, 1]])
     np.testing.assert_array_equal(labels.tracklets, [0, 0, 1, 2, 2])
     assert len(labels.object_of_tracklet) == 3
-    assert labels.left_out == {}
+    assert labels.dropped == {}
 
 
 def test_there_is_room_for_what_comes(labels):

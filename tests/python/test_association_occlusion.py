@@ -85,7 +85,7 @@ def test_edges_that_are_not_flagged_are_those_of_the_whole_object():
     crowd = CROWD.model_copy(update={"detector": CROWD.detector.model_copy(update=exact)})
     recording, truth = simulate(crowd, seed=3)
     boxes = recording.detections
-    row = np.searchsorted(truth.object_id, truth.box_object_id)
+    row = np.searchsorted(truth.object_ids, truth.box_object_id)
     model, objects = recording.odometry.pose_model, truth.ellipsoids
     flagged = hidden_edges(recording.camera, model, truth.poses, objects)[boxes.pose, row]
     whole, _ = _core.project_to_boxes(
@@ -124,7 +124,7 @@ def test_a_box_that_ends_before_a_hidden_edge_costs_nothing():
 def test_boxes_of_what_is_partly_hidden_fit_and_say_so():
     recording, truth = simulate(CROWD, seed=1)
     result = run(recording, RunOptions())
-    assert len(result.estimate.object_ids) == len(truth.object_id)
+    assert len(result.estimate.object_ids) == len(truth.object_ids)
     added = result.detections.truncated & ~recording.detections.truncated
     assert 0.02 < added.mean() < 0.2
     # Hidden boxes that are taken for whole ones are 8 to 9 % of outliers here.

@@ -22,7 +22,7 @@ def test_right_boxes_that_were_refused_come_back_and_straighten_the_path():
     found = associate(replace(recording, positions=None), trust=1.0, estimates_noise=False)
     true = truth.poses[found.keyframes]
     assert (found.scene.labels.object_rows >= 0).all()
-    assert found.left_out == {}
+    assert found.dropped == {}
     assert position_error(truth.pose_model, found.scene.poses, true) < 0.1
 
 
@@ -38,7 +38,7 @@ def test_what_fits_stays_as_it_is(scene):
     try_refused(scene)
     np.testing.assert_array_equal(scene.labels.object_rows, boxes)
     np.testing.assert_allclose(scene.poses, before, atol=1e-3)
-    assert scene.labels.left_out == {}
+    assert scene.labels.dropped == {}
 
 
 def test_an_object_whose_boxes_agree_on_nothing_is_left_out_with_a_reason(scene):
@@ -51,6 +51,6 @@ def test_an_object_whose_boxes_agree_on_nothing_is_left_out_with_a_reason(scene)
     jumping[rows] = np.hstack([corner, corner + 30.0])
     scene.recording = replace(scene.recording, detections=replace(boxes, box=jumping))
     try_refused(scene)
-    assert list(scene.labels.left_out) == [number]
-    assert scene.labels.left_out[number].startswith("one place explains ")
+    assert list(scene.labels.dropped) == [number]
+    assert scene.labels.dropped[number].startswith("one place explains ")
     assert (scene.labels.object_rows[boxes.object_id != 101] >= 0).all()

@@ -42,7 +42,7 @@ def test_a_seed_is_one_problem():
     first, again, other = (chain(1, 4, seed, 0.5) for seed in (3, 3, 4))
     np.testing.assert_array_equal(first.recording.detections.box, again.recording.detections.box)
     np.testing.assert_array_equal(first.peer_centers, again.peer_centers)
-    assert not np.array_equal(first.truth.center, other.truth.center)
+    assert not np.array_equal(first.truth.centers, other.truth.centers)
 
 
 def test_noise_is_a_factor_on_odometry():
@@ -87,7 +87,7 @@ def test_boxes_are_those_of_sampled_ellipsoids_and_a_pixel_of_noise():
 
 def test_peers_start_near_the_truth():
     problem = chain(4, 10, 0, 1e-6)
-    assert np.std(problem.peer_centers - problem.truth.center) == pytest.approx(0.3, rel=0.2)
+    assert np.std(problem.peer_centers - problem.truth.centers) == pytest.approx(0.3, rel=0.2)
 
 
 def test_paper_has_ellipsoids_and_boxes_only():

@@ -165,8 +165,8 @@ def drives(count=40):
             dq.calibrated_covariances(calibrated, estimate, findings),
         ):
             error = _core.minus(dq.PoseModel.SE2, truth.poses[-1:], estimate.poses[-1:])
-            rows = np.searchsorted(truth.object_id, estimate.object_ids)
-            miss = truth.center[rows] - estimate.centers
+            rows = np.searchsorted(truth.object_ids, estimate.object_ids)
+            miss = truth.centers[rows] - estimate.centers
             nees.append(
                 (
                     normalized_squares(error, marginals.poses[-1:]).mean(),

@@ -43,7 +43,7 @@ def solved():
 def test_an_object_at_the_place_of_another_is_contradicted():
     _, estimate, truth, victim, other = solved()
     center = estimate.centers[estimate.object_ids == victim][0]
-    place = truth.center[truth.object_id == other][0]
+    place = truth.centers[truth.object_ids == other][0]
     assert np.linalg.norm(center - place) < 0.3
     assert estimate.contradicted == {
         victim: f"it is where object {other} is, which fits its boxes as well"
@@ -66,7 +66,7 @@ def test_its_covariance_has_the_ways_to_all_other_objects():
     )
     others = np.arange(len(estimate.object_ids)) != row
     np.testing.assert_array_equal(marginals.objects[others], plain.objects[others])
-    miss = truth.center[truth.object_id == victim][0] - estimate.centers[row]
+    miss = truth.centers[truth.object_ids == victim][0] - estimate.centers[row]
     assert miss @ np.linalg.solve(plain.centers[row], miss) > 1e3
     assert miss @ np.linalg.solve(marginals.centers[row], miss) < 20.0
 
@@ -158,9 +158,9 @@ def test_two_objects_whose_ids_may_be_exchanged_are_named(share):
         assert f"of its boxes show object {other}, and" in estimate.contradicted[name]
     # With 40 % they are in their own places, with 60 % in each other's: the boxes look alike.
     row = int(np.flatnonzero(estimate.object_ids == first)[0])
-    place = truth.center[truth.object_id == (first if share < 0.5 else second)][0]
+    place = truth.centers[truth.object_ids == (first if share < 0.5 else second)][0]
     assert np.linalg.norm(estimate.centers[row] - place) < 0.3
-    way = truth.center[truth.object_id == first][0] - truth.center[truth.object_id == second][0]
+    way = truth.centers[truth.object_ids == first][0] - truth.centers[truth.object_ids == second][0]
     variance = dq.marginal_covariances(graph, estimate).centers[row]
     assert way @ np.linalg.solve(variance, way) < 30.0
 

@@ -41,10 +41,10 @@ def truth(poses, center, volume):
     return Truth(
         pose_model=PoseModel.SE2,
         poses=poses,
-        object_id=[4, 5, 6],
-        center=center,
-        volume=volume,
-        class_name=("cube",) * 3,
+        object_ids=[4, 5, 6],
+        centers=center,
+        volumes=volume,
+        class_names=("cube",) * 3,
     )
 
 

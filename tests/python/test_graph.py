@@ -183,7 +183,7 @@ def test_a_noise_free_recording_is_recovered():
     assert len(estimate.object_ids) == 4
     assert summary.final_cost < 1e-9
     np.testing.assert_allclose(estimate.poses, truth.poses, atol=1e-6)
-    np.testing.assert_allclose(estimate.centers, truth.center, atol=1e-6)
+    np.testing.assert_allclose(estimate.centers, truth.centers, atol=1e-6)
     true = np.array([_core.dual_quadric_from_ellipsoid(row) for row in truth.ellipsoids])
     np.testing.assert_allclose(estimate.dual_quadrics, true, atol=1e-6)
     assert estimate.is_ellipsoid.all()

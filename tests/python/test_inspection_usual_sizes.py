@@ -36,9 +36,9 @@ def table(tmp_path_factory):
     recording, truth = dq.simulate(dq.load_scenario("orbit"), seed=5)
     io.save_recording(recording, folder)
     boxes = io.read_detections(folder / "boxes.csv", cut=False, check=False)
-    sizes = np.cbrt(6.0 * truth.volume / np.pi)  # diameters of spheres
+    sizes = np.cbrt(6.0 * truth.volumes / np.pi)  # diameters of spheres
     order = np.argsort(np.argsort(sizes)) * len(NAMES) // len(sizes)
-    number = order[np.searchsorted(truth.object_id, boxes.track_id)]
+    number = order[np.searchsorted(truth.object_ids, boxes.track_id)]
     named = replace(boxes, class_id=number, class_name=tuple(NAMES[one] for one in number.tolist()))
     return recording.camera, io.read_trajectory(folder / "odometry.txt"), named
 

@@ -81,10 +81,10 @@ def test_in_space_the_files_give_the_estimate_of_the_recording(tmp_path, scenari
 def test_the_truth_is_read_again(tmp_path):
     recording, truth, loaded, _ = written(tmp_path, "orbit", 2)
     objects = io.read_true_objects(tmp_path / "objects.csv")
-    np.testing.assert_array_equal(objects.id, truth.object_id)
-    assert objects.class_name == truth.class_name
-    np.testing.assert_allclose(objects.center, truth.center, atol=1e-12)
-    np.testing.assert_allclose(np.pi / 6 * objects.size.prod(axis=1), truth.volume, rtol=1e-12)
+    np.testing.assert_array_equal(objects.id, truth.object_ids)
+    assert objects.class_name == truth.class_names
+    np.testing.assert_allclose(objects.center, truth.centers, atol=1e-12)
+    np.testing.assert_allclose(np.pi / 6 * objects.size.prod(axis=1), truth.volumes, rtol=1e-12)
     for row, ellipsoid in enumerate(truth.ellipsoids):
         turned = objects.rotation[row] * (objects.size[row] / 2.0)
         lower = np.diag(np.exp(ellipsoid[3:6]))
@@ -100,7 +100,7 @@ def test_the_truth_is_read_again(tmp_path):
 def test_a_cube_has_the_size_of_its_side(tmp_path):
     _, truth, _, _ = written(tmp_path, "paper", 0)
     objects = io.read_true_objects(tmp_path / "objects.csv")
-    np.testing.assert_allclose(objects.size, np.tile(np.cbrt(truth.volume)[:, None], 3))
+    np.testing.assert_allclose(objects.size, np.tile(np.cbrt(truth.volumes)[:, None], 3))
     assert objects.rotation is None
     assert set(objects.class_name) == {"cube"}
 
@@ -149,7 +149,7 @@ def test_cuboids_have_their_sides_and_orientation(tmp_path):
     np.testing.assert_array_equal(read.size, 2.0 * truth.cuboids[:, 3:6])
     for row, turn in enumerate(truth.cuboids[:, 6:]):
         np.testing.assert_allclose(read.rotation[row], oracle.quaternion_matrix(turn), atol=1e-12)
-    np.testing.assert_allclose(read.size.prod(axis=1), truth.volume)
+    np.testing.assert_allclose(read.size.prod(axis=1), truth.volumes)
 
 
 def test_boxes_that_show_nothing_are_of_no_object(tmp_path):

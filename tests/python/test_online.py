@@ -92,7 +92,7 @@ def test_ranges_reach_a_session_as_they_reach_solve(problem):
     boxes, truth = problem.recording.detections, problem.truth
     name = int(boxes.object_id[0])
     poses = boxes.pose[boxes.object_id == name][[10, 20, 30]]
-    center = truth.center[np.flatnonzero(truth.object_id == name)[0]]
+    center = truth.centers[np.flatnonzero(truth.object_ids == name)[0]]
     robots = np.column_stack([truth.poses[poses, :2], np.zeros(3)])
     ranges = dq.Measurements(
         "range",

@@ -65,7 +65,7 @@ def assert_found(made: Film, slam: OnlineSlam, *, recall):
     assert (result.found, result.missed, result.invented, result.split) == (8, 0, 0, 0)
     assert result.purity >= 0.98
     assert result.recall >= recall
-    assert slam.left_out == {}
+    assert slam.dropped == {}
     assert slam.num_objects == len(slam.objects) == 8
 
 
@@ -125,9 +125,9 @@ def test_what_moves_is_left_out_and_said():
     made = film(orbit_poses(40), [*table_things(7), mover], noise=NOISE)
     slam = followed(made)
     slam.polish()
-    assert slam.left_out
+    assert slam.dropped
     shown = np.concatenate(slam.assignments)
-    for number, why in slam.left_out.items():
+    for number, why in slam.dropped.items():
         assert "it moved" in why
         assert set(made.thing[shown == number].tolist()) == {7}
         assert number not in slam.objects.object_ids
@@ -165,13 +165,13 @@ def test_a_late_commit_overrules_nothing_that_has_changed_meanwhile():
     here, there = local.scene.labels, copy.deepcopy(before)
     mine, theirs, both = np.flatnonzero(before.object_rows == 0)[:3]
     here.release(np.array([mine, both]))
-    here.left_out[2] = "it moved"
+    here.dropped[2] = "it moved"
     here.object_of_tracklet[before.tracklets[mine]] = 1
     there.release(np.array([theirs]))
     there.cut_tracklet(np.array([both]))
     there.object_rows[both] = 3
     there.object_of_tracklet[before.tracklets[theirs]] = 3
-    there.left_out = {4: "it moved, too"}
+    there.dropped = {4: "it moved, too"}
     store.labels = there
     commit(state, local)
     expected = before.object_rows.copy()
@@ -180,7 +180,7 @@ def test_a_late_commit_overrules_nothing_that_has_changed_meanwhile():
     assert store.labels.object_of_tracklet[before.tracklets[mine]] == 1
     assert store.labels.object_of_tracklet[before.tracklets[theirs]] == 3
     np.testing.assert_array_equal(store.labels.tracklets, there.tracklets)
-    assert set(store.labels.left_out) == {2, 4}
+    assert set(store.labels.dropped) == {2, 4}
     assert before.object_rows[mine] == 0  # a snapshot keeps what it has
 
 

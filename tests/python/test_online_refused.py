@@ -132,7 +132,7 @@ def bits(slam):
     parts += [estimate.ellipsoids, estimate.observations, slam.objects.ellipsoids]
     parts += [slam.shown, slam.keyframes, *slam.assignments]
     told = (estimate.class_names, repr(slam), repr(slam.odometry_noise), repr(slam.size_prior))
-    return [part.tobytes() for part in parts], told, slam.left_out
+    return [part.tobytes() for part in parts], told, slam.dropped
 
 
 def files(folder: Path):

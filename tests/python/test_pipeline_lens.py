@@ -40,7 +40,7 @@ def through(lens, focal, angle):
         inside = np.all((box[:, :2] > 3) & (box[:, 2:] < [636, 476]), axis=1)  # false for NaN
         boxes.append(box[inside])
         pose += [row] * int(inside.sum())
-        object_id += truth.object_id[in_front][inside].tolist()
+        object_id += truth.object_ids[in_front][inside].tolist()
     recorded = np.concatenate(boxes)
     detections = dq.Detections.from_xyxy(pose, recorded + 0.5, object_id=object_id, camera=camera)
     odometry = dq.Odometry.from_poses(poses, covariance=np.eye(6) * 1e-6)
@@ -57,9 +57,9 @@ def test_boxes_of_a_run_are_exact(case):
     result = dq.run(recording, options)
     estimate = result.estimate
     assert estimate.camera is recording.camera
-    seen = np.isin(truth.object_id, estimate.object_ids)
+    seen = np.isin(truth.object_ids, estimate.object_ids)
     assert len(estimate.object_ids) == len(np.unique(recording.detections.object_id))
-    errors = np.linalg.norm(estimate.centers - truth.center[seen], axis=1)
+    errors = np.linalg.norm(estimate.centers - truth.centers[seen], axis=1)
     assert errors.max() < 1e-3  # meters
     row = np.searchsorted(estimate.object_ids, result.detections.object_id)
     poses, ellipsoids = estimate.poses[result.detections.pose], estimate.ellipsoids[row]
@@ -85,7 +85,7 @@ def test_objects_beyond_the_rectangle_of_the_pinhole_are_found():
     unknown = replace(recording, detections=replace(recording.detections, object_id=ids))
     result = dq.run(unknown)
     assert np.mean(result.detections.object_id[outside] >= 0) > 0.95
-    nearest = np.linalg.norm(result.estimate.centers[:, None] - truth.center, axis=2).min(axis=1)
+    nearest = np.linalg.norm(result.estimate.centers[:, None] - truth.centers, axis=2).min(axis=1)
     assert nearest.max() < 0.01
 
 
@@ -151,7 +151,7 @@ def test_a_session_has_the_noise_of_the_batch():
 def test_a_recording_through_a_lens_is_replayed_step_by_step():
     recording, truth, _ = through(*CASES["fisheye"])
     result = dq.run(recording, online=True)
-    nearest = np.linalg.norm(result.estimate.centers[:, None] - truth.center, axis=2).min(axis=1)
+    nearest = np.linalg.norm(result.estimate.centers[:, None] - truth.centers, axis=2).min(axis=1)
     assert len(nearest) == 8
     assert nearest.max() < 0.02
     assert result.estimate.camera is recording.camera

@@ -43,7 +43,7 @@ def write_files(folder, seed):
     centers = []
     for row in range(3, len(cameras), 12):
         back = _core.inverse(SE3, cameras[[row]])[0]
-        for one, center in zip(truth.object_id.tolist(), truth.center, strict=True):
+        for one, center in zip(truth.object_ids.tolist(), truth.centers, strict=True):
             local = _core.compose(SE3, back[None], np.array([[*center, 0, 0, 0, 1.0]]))[0, :3]
             noisy = local + rng.multivariate_normal(np.zeros(3), CENTER)
             centers.append([row, one, *noisy.tolist(), *upper(CENTER)])
@@ -152,7 +152,7 @@ def test_positions_move_objects_at_known_poses():
         assert np.array_equal(result.estimate.poses, without.estimate.poses)
         for errors, each in ((before, without), (after, result)):
             rows = true_rows(each.estimate.object_ids, truth)
-            off = each.estimate.centers - truth.center[rows]
+            off = each.estimate.centers - truth.centers[rows]
             errors += np.linalg.norm(off, axis=1).tolist()
         nees += normalized_squares(off, result.marginals.objects[:, :3, :3]).tolist()
     assert np.mean(after) < 0.8 * np.mean(before)

@@ -31,7 +31,7 @@ def table():
 def height_error(estimate, truth):
     rows = true_rows(estimate.object_ids, truth)
     # Without what all have in common: the start of the path is a pose of the odometry.
-    return (estimate.centers[:, 2] - truth.center[rows, 2]).std()
+    return (estimate.centers[:, 2] - truth.centers[rows, 2]).std()
 
 
 @pytest.mark.parametrize("mode", [dq.Mode.SLAM, dq.Mode.MAPPING])

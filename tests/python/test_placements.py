@@ -74,7 +74,7 @@ def simulated(scenario, seed):
 
 def center_error(estimate, truth):
     rows = true_rows(estimate.object_ids, truth)
-    return np.linalg.norm(estimate.centers - truth.center[rows], axis=1).mean()
+    return np.linalg.norm(estimate.centers - truth.centers[rows], axis=1).mean()
 
 
 def test_a_plane_of_unknown_height_helps_and_is_found(scenario):

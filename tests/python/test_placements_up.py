@@ -184,7 +184,7 @@ def test_up_is_estimated_with_the_map(looks):
         scores.append(flat @ np.linalg.solve(found.up.covariance[:2, :2], flat) / 2)
         errors = []
         for each in (wrong, right):
-            off = each.centers - truth.center[true_rows(each.object_ids, truth)]
+            off = each.centers - truth.centers[true_rows(each.object_ids, truth)]
             errors.append(np.linalg.norm(off, axis=1).mean())
         centers.append(errors)
         nees.append(normalized_squares(off, marginals.centers).mean())

@@ -104,7 +104,7 @@ def test_graphs_are_solved_together(solved):
     # The same data twice: the same optimum, and the center as if its boxes had half the variance.
     np.testing.assert_allclose(joint.estimate.centers, estimate.centers, atol=0.05)
     np.testing.assert_allclose(joint.estimate.poses[count], estimate.poses[0], atol=0.05)
-    error = np.linalg.norm(joint.estimate.centers - truth.center[estimate.object_ids], axis=1)
+    error = np.linalg.norm(joint.estimate.centers - truth.centers[estimate.object_ids], axis=1)
     assert error.mean() < 0.2
     ratio = np.trace(joint.marginals.centers, axis1=1, axis2=2)
     ratio = ratio / np.trace(marginals.centers, axis1=1, axis2=2)

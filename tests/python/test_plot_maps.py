@@ -34,13 +34,13 @@ def maps():
 def test_a_true_cube_is_a_disc_of_its_volume(maps):
     _, _, truth = maps[0]
     radius = np.sqrt([area(outline) / np.pi for outline in _true_outlines(truth)])
-    np.testing.assert_allclose(4.0 / 3.0 * np.pi * radius**3, truth.volume, rtol=0.01)
+    np.testing.assert_allclose(4.0 / 3.0 * np.pi * radius**3, truth.volumes, rtol=0.01)
 
 
 def test_true_ellipsoids_are_drawn_where_they_are(maps):
     _, _, truth = maps[1]
     middle = [outline[:, :-1].mean(axis=1) for outline in _true_outlines(truth)]
-    np.testing.assert_allclose(middle, truth.center[:, :2], atol=1e-9)
+    np.testing.assert_allclose(middle, truth.centers[:, :2], atol=1e-9)
 
 
 def test_the_window_holds_the_truth_and_is_not_blown_up_by_a_diverged_estimate(maps):

@@ -70,10 +70,10 @@ def truth(**changes):
     values = {
         "pose_model": PoseModel.SE2,
         "poses": np.zeros((3, 3)),
-        "object_id": [0, 1],
-        "center": np.zeros((2, 3)),
-        "volume": [1.0, 2.0],
-        "class_name": ("cup", "cup"),
+        "object_ids": [0, 1],
+        "centers": np.zeros((2, 3)),
+        "volumes": [1.0, 2.0],
+        "class_names": ("cup", "cup"),
     }
     return Truth(**values | changes)
 
@@ -169,9 +169,9 @@ HALF_TURN = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.1]
             {"detections": detections(box=[[700.0, 0, 800, 9], [0, 0, 9, 9]])},
             r"detections\.box row 0: box outside the image: \[700",
         ),
-        (truth, {"object_id": [1, 1]}, r"truth\.object_id: an id occurs twice"),
-        (truth, {"volume": [1.0, 0.0]}, r"truth\.volume row 1: not positive: 0"),
-        (truth, {"class_name": ("cup",)}, r"truth\.class_name: expected 2, got 1"),
+        (truth, {"object_ids": [1, 1]}, r"truth\.object_ids: an id occurs twice"),
+        (truth, {"volumes": [1.0, 0.0]}, r"truth\.volumes row 1: not positive: 0"),
+        (truth, {"class_names": ("cup",)}, r"truth\.class_names: expected 2, got 1"),
         (truth, {"ellipsoids": np.zeros((1, 9))}, r"truth\.ellipsoids: expected shape \(2, 9\)"),
         (truth, {"box_object_id": [1, 2]}, r"truth\.box_object_id row 1: no such object: 2"),
     ],

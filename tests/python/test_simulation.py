@@ -45,7 +45,7 @@ def test_same_seed_same_bits():
     assert once.odometry.relative.tobytes() == again.odometry.relative.tobytes()
     assert once.detections.box.tobytes() == again.detections.box.tobytes()
     assert once.positions.object_in_robot.tobytes() == again.positions.object_in_robot.tobytes()
-    assert truth.center.tobytes() == truth_again.center.tobytes()
+    assert truth.centers.tobytes() == truth_again.centers.tobytes()
     other, _ = paper(seed=1)
     assert np.abs(once.odometry.relative - other.odometry.relative).max() > 0.01
 
@@ -59,8 +59,8 @@ def test_new_kinds_of_errors_leave_the_numbers_of_older_scenarios():
             [141.539971148, 121.634565112, 518.677306327, 449.070723153],
         ),
         (recording.positions.object_in_robot[11], [-0.454569581182, 2.22307133431, 0.37730025948]),
-        (truth.center[4], [-3.935317607090, 7.962135029120, -0.355766897287]),
-        (truth.volume[4], 0.358689704542),
+        (truth.centers[4], [-3.935317607090, 7.962135029120, -0.355766897287]),
+        (truth.volumes[4], 0.358689704542),
     ]
     orbit, orbited = simulate(load_scenario("orbit"), seed=3)
     numbers += [
@@ -88,7 +88,7 @@ def test_the_kind_of_objects_changes_nothing_but_the_boxes():
 def test_the_noise_of_one_sensor_leaves_the_others():
     recording, truth = paper()
     louder, same_truth = simulate(changed("detector", edge_sigma_px=3.0), seed=0)
-    np.testing.assert_array_equal(truth.center, same_truth.center)
+    np.testing.assert_array_equal(truth.centers, same_truth.centers)
     np.testing.assert_array_equal(recording.odometry.relative, louder.odometry.relative)
     np.testing.assert_array_equal(
         recording.positions.object_in_robot, louder.positions.object_in_robot
@@ -119,7 +119,7 @@ def expected_boxes(recording, truth):
             if box is None or (box[:2] < -0.5).any() or box[2] > 1279.5 or box[3] > 1023.5:
                 continue
             if max(box[2] - box[0], box[3] - box[1]) > 100.0:
-                boxes[pose, int(truth.object_id[row])] = box
+                boxes[pose, int(truth.object_ids[row])] = box
     return boxes
 
 
@@ -173,7 +173,7 @@ def test_an_object_that_is_never_detected_is_in_the_truth_only():
     recording, truth = simulate(changed("detector", min_side_px=350.0), seed=0)
     seen = np.unique(recording.detections.object_id)
     assert 0 < len(seen) < 10
-    np.testing.assert_array_equal(truth.object_id, np.arange(10))
+    np.testing.assert_array_equal(truth.object_ids, np.arange(10))
     np.testing.assert_array_equal(np.unique(recording.positions.object_id), seen)
 
 
@@ -193,7 +193,7 @@ def test_volumes_are_those_of_the_shapes():
 def test_objects_keep_their_distance_from_the_path():
     for seed in range(20):
         truth = paper(seed=seed)[1]
-        place, path = truth.center[:, None, :2], truth.poses[None, :, :2]
+        place, path = truth.centers[:, None, :2], truth.poses[None, :, :2]
         inside = (place > path.min(axis=1) + 1.5) & (place < path.max(axis=1) - 1.5)
         assert inside.all()
 
@@ -262,7 +262,7 @@ def test_honest_sizes_are_what_the_size_prior_believes():
     normal = []
     for seed in range(100):
         _, truth = simulate(HONEST, seed=seed)
-        for ellipsoid, volume in zip(truth.ellipsoids, truth.volume, strict=True):
+        for ellipsoid, volume in zip(truth.ellipsoids, truth.volumes, strict=True):
             _, axes, orientation = _core.axes_from_ellipsoid(ellipsoid)
             assert volume == pytest.approx(4.0 / 3.0 * np.pi * np.prod(axes))
             turn = Rotation.from_quat(orientation).as_matrix()
@@ -288,7 +288,7 @@ def test_relative_positions_are_in_the_robots_frame():
     for recording, truth in map(_of_seed, range(5)):
         positions = recording.positions
         expected = [
-            np.linalg.inv(oracle.se2_matrix(truth.poses[pose])) @ [*truth.center[row], 1.0]
+            np.linalg.inv(oracle.se2_matrix(truth.poses[pose])) @ [*truth.centers[row], 1.0]
             for pose, row in zip(positions.pose, positions.object_id, strict=True)
         ]
         errors.append(positions.object_in_robot - np.array(expected)[:, :3])

@@ -136,7 +136,7 @@ def sampled_box(recording, truth, pair):
     surfaces = [oracle.ellipsoid_surface(*body, count=120) for body in bodies]
     pixels, _ = oracle.to_pixels(recording.camera, robot, surfaces[shown])
     eye = (robot @ oracle.se3_matrix(recording.camera.robot_from_camera))[:3, 3]
-    distance = np.linalg.norm(truth.center - eye, axis=1)
+    distance = np.linalg.norm(truth.centers - eye, axis=1)
     covered = np.zeros(len(pixels), dtype=np.bool_)
     for row, (center, axes, turn) in enumerate(bodies):
         if distance[row] < distance[shown]:

@@ -80,8 +80,8 @@ def test_the_camera_is_vga(runs):
 def test_objects_stand_on_the_table_or_above_it(runs):
     lift = []
     for _, truth in runs:
-        assert len(truth.center) == 8
-        assert (np.abs(truth.center[:, :2]) <= [0.75, 0.5]).all()
+        assert len(truth.centers) == 8
+        assert (np.abs(truth.centers[:, :2]) <= [0.75, 0.5]).all()
         for ellipsoid in truth.ellipsoids:
             surface = oracle.ellipsoid_surface(*_core.axes_from_ellipsoid(ellipsoid), count=60)
             lift.append(surface[:, 2].min())
@@ -93,7 +93,7 @@ def test_objects_stand_on_the_table_or_above_it(runs):
 def test_cubes_stand_on_the_table_too():
     resting = changed("world", lift_max_m=0.0).model_copy(update={"objects": "cubes"})
     recording, truth = simulate(resting, seed=0)
-    np.testing.assert_allclose(truth.center[:, 2], np.cbrt(truth.volume) / 2.0)
+    np.testing.assert_allclose(truth.centers[:, 2], np.cbrt(truth.volumes) / 2.0)
     assert len(recording.detections) > 800
 
 
@@ -127,7 +127,7 @@ def test_relative_positions_are_in_the_cameras_mount(runs):
     recording, truth = runs[0]
     positions = recording.positions
     inverse = np.linalg.inv(matrices(truth.poses))[positions.pose]
-    center = truth.center[positions.object_id]
+    center = truth.centers[positions.object_id]
     expected = np.einsum("nij,nj->ni", inverse[:, :3, :3], center) + inverse[:, :3, 3]
     error = positions.object_in_robot - expected
     np.testing.assert_allclose(error.std(axis=0), 0.02, rtol=0.06)
@@ -137,7 +137,7 @@ def test_relative_positions_are_in_the_cameras_mount(runs):
 def test_the_path_has_its_own_numbers(runs):
     _, truth = runs[0]
     _, louder = simulate(changed("path", height_sigma_m=0.2), seed=0)
-    np.testing.assert_array_equal(truth.center, louder.center)
+    np.testing.assert_array_equal(truth.centers, louder.centers)
     np.testing.assert_allclose(louder.poses[:, 2] - 0.6, 2.0 * (truth.poses[:, 2] - 0.6))
     assert np.abs(truth.poses - runs[1][1].poses).max() > 0.1
 

@@ -78,9 +78,9 @@ def test_the_box_of_a_cuboid_bounds_its_corners():
     assert truth.ellipsoids is None
     for row, ellipsoid in enumerate(twins.ellipsoids):
         center, half, turn = _core.axes_from_ellipsoid(ellipsoid)
-        assert truth.volume[row] == pytest.approx(8.0 * half.prod())
+        assert truth.volumes[row] == pytest.approx(8.0 * half.prod())
         np.testing.assert_allclose(np.sort(truth.cuboids[row, 3:6]), np.sort(half), rtol=1e-6)
-        np.testing.assert_array_equal(truth.cuboids[row, :3], truth.center[row])
+        np.testing.assert_array_equal(truth.cuboids[row, :3], truth.centers[row])
         signs = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)])
         corners = center + (signs * half) @ oracle.quaternion_matrix(turn).T
         for index in np.flatnonzero(truth.box_object_id == row)[::17]:
@@ -100,15 +100,15 @@ def test_tilted_objects_stand_on_the_table(objects):
         _, half, turn = _core.axes_from_ellipsoid(ellipsoid)
         up = np.abs(oracle.quaternion_matrix(turn)[2])
         height = up @ half if objects == "cuboids" else np.linalg.norm(up * half)
-        assert truth.center[row, 2] == pytest.approx(height)
+        assert truth.centers[row, 2] == pytest.approx(height)
 
 
 def test_objects_take_turns_in_their_classes():
     recording, truth = simulate(changed(class_count=3), seed=0)
-    assert truth.class_name[:4] == ("ellipsoid_1", "ellipsoid_2", "ellipsoid_3", "ellipsoid_1")
+    assert truth.class_names[:4] == ("ellipsoid_1", "ellipsoid_2", "ellipsoid_3", "ellipsoid_1")
     boxes = recording.detections
     names = [boxes.class_names[number] for number in boxes.class_id.tolist()]
-    assert names == [truth.class_name[row] for row in truth.box_object_id.tolist()]
+    assert names == [truth.class_names[row] for row in truth.box_object_id.tolist()]
 
 
 # --- places --------------------------------------------------------------------------------------
@@ -133,7 +133,7 @@ def test_objects_are_beside_a_corridor(name):
 def test_objects_beside_a_path_are_not_on_it(name):
     scenario = load_scenario(name)
     _, truth = simulate(scenario, seed=0)
-    away = np.linalg.norm(truth.center[:, None, :2] - truth.poses[:, :2], axis=2).min(axis=1)
+    away = np.linalg.norm(truth.centers[:, None, :2] - truth.poses[:, :2], axis=2).min(axis=1)
     assert away.min() > scenario.world.distance_min_m - 1e-6
     assert away.max() <= scenario.world.distance_max_m
 
@@ -148,7 +148,7 @@ def test_objects_beside_a_flight_are_on_its_left():
     kept |= {name: content["world"][name] for name in ("side_min_m", "semi_axis_factor")}
     content["world"] = kept | world | {"height_sigma_m": 0.1}
     _, truth = simulate(Scenario.model_validate(content), seed=0)
-    inside = (truth.center[:, 0] / 10.0) ** 2 + (truth.center[:, 1] / 6.0) ** 2
+    inside = (truth.centers[:, 0] / 10.0) ** 2 + (truth.centers[:, 1] / 6.0) ** 2
     assert (inside < 1.0).all()
 
 

@@ -104,8 +104,8 @@ def test_cubes_are_mapped_at_the_true_poses():
     _, truth, graph, _ = solved("cubes")
     state = true_state(graph, truth, SolveOptions())
     np.testing.assert_array_equal(state.poses, truth.poses)
-    rows = np.searchsorted(truth.object_id, graph.object_ids)
-    error = np.linalg.norm(state.landmarks[:, :3] - truth.center[rows], axis=1)
+    rows = np.searchsorted(truth.object_ids, graph.object_ids)
+    error = np.linalg.norm(state.landmarks[:, :3] - truth.centers[rows], axis=1)
     assert np.median(error) < 0.05
     assert 0.01 < posterior_bound(graph, truth).position_error < 0.5
 
@@ -182,8 +182,8 @@ def mean_nees(drives=60):
         marginals = marginal_covariances(graph, estimate)
         error = _core.minus(PoseModel.SE2, truth.poses[-1:], estimate.poses[-1:])
         pose_nees.append(normalized_squares(error, marginals.poses[-1:]).mean())
-        rows = np.searchsorted(truth.object_id, estimate.object_ids)
-        miss = estimate.centers - truth.center[rows]
+        rows = np.searchsorted(truth.object_ids, estimate.object_ids)
+        miss = estimate.centers - truth.centers[rows]
         center_nees.append(normalized_squares(miss, marginals.centers).mean())
     return np.mean(pose_nees), np.mean(center_nees), chi_square_interval(3 * drives)
 

@@ -44,10 +44,10 @@ class Association:
     keyframes: Ints
     """Rows of the poses whose boxes were used, shape (n,)."""
     scene: SceneMap
-    """Poses of the keyframes and objects; row ``j`` is the object ``ids[j]``."""
-    ids: Ints
+    """Poses of the keyframes and objects; row ``j`` is the object ``object_ids[j]``."""
+    object_ids: Ints
     """Ids of the objects, -1 for one that was given up, shape (o,)."""
-    left_out: dict[int, str]
+    dropped: dict[int, str]
     """Ids of objects that do not fit a world at rest, and why. Their boxes keep the ids."""
     hidden: Bools
     """Whether a nearer object seems to hide each edge of each box, shape (m, 4)."""
@@ -60,8 +60,10 @@ class Association:
         """Show how many objects there are, and how many of the boxes show one."""
         shown = int(np.sum(self.object_id >= 0))
         boxes = f"{shown} of {counted(len(self.object_id), 'box')}"
-        left_out = f", {len(self.left_out)} left out" if self.left_out else ""
-        return f"Association({counted(int(np.sum(self.ids >= 0)), 'object')}, {boxes}{left_out})"
+        dropped = f", {len(self.dropped)} dropped" if self.dropped else ""
+        return (
+            f"Association({counted(int(np.sum(self.object_ids >= 0)), 'object')}, {boxes}{dropped})"
+        )
 
     def build_graph(self) -> Graph:
         """Lay out the keyframes and the objects at rest, by their ids, as ``solve`` needs them.
@@ -74,8 +76,8 @@ class Association:
             When no object was found.
         """
         scene = self.scene
-        names = np.append(self.ids, -1)
-        names[list(scene.labels.left_out)] = -1
+        names = np.append(self.object_ids, -1)
+        names[list(scene.labels.dropped)] = -1
         object_id = names[scene.labels.object_rows]
         used = object_id >= 0
         if not used.any():
@@ -90,7 +92,7 @@ class Association:
 
     def start(self, graph: Graph) -> _core.State:
         """Return the poses and objects of such a graph as the association has estimated them."""
-        row_of = {number: row for row, number in enumerate(self.ids.tolist())}
+        row_of = {number: row for row, number in enumerate(self.object_ids.tolist())}
         rows = [row_of[number] for number in graph.object_ids.tolist()]
         return _core.State(self.scene.poses, self.scene.ellipsoids[rows])
 
@@ -200,10 +202,10 @@ def associate(
         reassign(everything, attempt.follower.switch_cost)
         object_id, ids = _numbered(everything.labels.object_rows, len(scene.ellipsoids))
     progress(1.0)
-    named = {int(ids[row]): why for row, why in labels.left_out.items()}
-    left_out = {name: why for name, why in named.items() if name >= 0}
+    named = {int(ids[row]): why for row, why in labels.dropped.items()}
+    dropped = {name: why for name, why in named.items() if name >= 0}
     if trust == FINAL:
-        left_out |= not_found(recording, ids, used)
+        dropped |= not_found(recording, ids, used)
     remarks += describe_jumps(scene) + ([why_none] if why_none else [])
     hidden = _hidden_edges(scene, recording, keyframes, (object_id, ids))
     of_all = (np.cumsum(single) - 1)[counts]
@@ -212,7 +214,7 @@ def associate(
         keyframes,
         scene,
         ids,
-        dict(sorted(left_out.items())),
+        dict(sorted(dropped.items())),
         hidden[of_all] & single[:, None],
         ~single,
         tuple(remarks),

@@ -61,7 +61,7 @@ class Follower:
                 scene.estimate_noise()
             if not self.final:
                 join_duplicates(scene)
-            scene.labels.left_out = find_misfits(scene)
+            scene.labels.dropped = find_misfits(scene)
             progress(len(scene.poses) / end)
 
     def assign_ahead(

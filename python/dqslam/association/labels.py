@@ -60,7 +60,7 @@ class Labels:
         """Sum of what the boxes of each object look like, shape (o, e)."""
         self.joined_into = np.zeros(0, dtype=np.int64)
         """Object that each was joined into, itself by default, shape (o,)."""
-        self.left_out: dict[ObjectRow, str] = {}
+        self.dropped: dict[ObjectRow, str] = {}
         """Objects that take no part in the estimate, and why."""
 
     def since(self, first: int) -> Labels:
@@ -82,7 +82,7 @@ class Labels:
         self.votes, self.look_sums = other.votes.copy(), other.look_sums.copy()
         self.class_evidence = other.class_evidence.copy()
         self.joined_into = np.arange(len(self.votes))
-        self.left_out, self.appearance = dict(other.left_out), other.appearance
+        self.dropped, self.appearance = dict(other.dropped), other.appearance
 
     @classmethod
     def of(cls, detections: Detections, tracklets: Ints) -> Labels:
@@ -144,7 +144,7 @@ class Labels:
     def takes_part(self) -> Bools:
         """Whether each object takes part in the estimate, shape (o + 1,); row -1 never does."""
         flags = np.ones(len(self.votes) + 1, dtype=np.bool_)
-        flags[[*self.left_out, -1]] = False
+        flags[[*self.dropped, -1]] = False
         return flags
 
     def are_strangers(self, rows: Ints) -> Bools:

@@ -46,10 +46,10 @@ def refine(
         follower.initiate_objects(scene)
         if not follower.final:
             join_duplicates(scene)
-        labels.left_out = find_misfits(scene)
-        labels.left_out |= find_movers(scene)
+        labels.dropped = find_misfits(scene)
+        labels.dropped |= find_movers(scene)
         if follower.final:
-            labels.left_out |= find_scattered(scene)
+            labels.dropped |= find_scattered(scene)
         progress((done + 1) / ROUNDS)
     settle(scene)
     if follower.final and scene.mode == _core.Mode.SLAM:
@@ -67,13 +67,13 @@ def try_refused(scene: SceneMap) -> None:
     labels = scene.labels
     refused = np.flatnonzero(labels.object_rows < 0)
     labels.assign(refused, labels.object_of_tracklet[labels.tracklets[refused]])
-    labels.left_out = {}
+    labels.dropped = {}
     settle(scene)
     reassign(scene, np.inf)
-    labels.left_out = _find_few(scene)
-    labels.left_out |= find_misfits(scene)
-    labels.left_out |= find_movers(scene)
-    labels.left_out |= find_scattered(scene)
+    labels.dropped = _find_few(scene)
+    labels.dropped |= find_misfits(scene)
+    labels.dropped |= find_movers(scene)
+    labels.dropped |= find_scattered(scene)
     settle(scene)
 
 

@@ -170,10 +170,10 @@ class SceneMap:
         The cost is half the sum of squared residuals, in sigmas, after the loss. The map stays as
         it is.
         """
-        left_out = self.labels.left_out
-        self.labels.left_out = left_out | dict.fromkeys(object_rows, "on trial")
+        dropped = self.labels.dropped
+        self.labels.dropped = dropped | dict.fromkeys(object_rows, "on trial")
         graph = self.graph()
-        self.labels.left_out = left_out
+        self.labels.dropped = dropped
         if graph is None:
             return 0.0, self._path_by_odometry()
         solution = _core.solve(graph.core, self._options(max_iterations), self.state(graph))

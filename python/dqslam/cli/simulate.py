@@ -94,7 +94,7 @@ def _summary(recording: "Recording", truth: "Truth") -> dict[str, float]:
     return {
         "poses": len(truth.poses),
         "seconds": float(recording.timestamps[-1] - recording.timestamps[0]),
-        "objects": len(truth.center),
+        "objects": len(truth.centers),
         "objects seen": len(np.unique(boxes.object_id)),
         "boxes": len(boxes),
     }

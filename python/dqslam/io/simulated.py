@@ -90,7 +90,7 @@ def write_truth(truth: Truth, recording: Recording, directory: Path) -> None:
     """Write the files of the truth into a folder that has none of them."""
     _write_path(directory / "groundtruth.txt", recording, truth.pose_model, truth.poses)
     names = ["object_id", "class_name", "x", "y", "z", "sx", "sy", "sz"]
-    columns: list[Sequence[object]] = [truth.object_id.tolist(), truth.class_name]
+    columns: list[Sequence[object]] = [truth.object_ids.tolist(), truth.class_names]
     quaternion = ["qx", "qy", "qz", "qw"]
     if truth.ellipsoids is not None:
         names += quaternion
@@ -101,7 +101,7 @@ def write_truth(truth: Truth, recording: Recording, directory: Path) -> None:
         center, half, turn = np.split(truth.cuboids, [3, 6], axis=1)
         numbers = np.column_stack([center, 2.0 * half, turn])
     else:
-        numbers = np.column_stack([truth.center, *[np.cbrt(truth.volume)] * 3])
+        numbers = np.column_stack([truth.centers, *[np.cbrt(truth.volumes)] * 3])
     columns += _columns(numbers)
     _write_table(directory / "objects.csv", names, columns)
     boxes = recording.detections

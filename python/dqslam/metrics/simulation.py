@@ -67,17 +67,17 @@ def evaluate(estimate: Estimate, truth: Truth) -> Report:
     rows = true_rows(estimate.object_ids, truth)
     paper_volumes = cube_volumes(estimate.shapes)
     paper_volumes[estimate.is_body] = estimate.volumes[estimate.is_body]
-    volume_errors = np.abs(paper_volumes - truth.volume[rows])
+    volume_errors = np.abs(paper_volumes - truth.volumes[rows])
     real = estimate.is_ellipsoid
     volumes_of = box_volumes if truth.ellipsoids is None else ellipsoid_volumes
     volumes = np.full(len(rows), np.nan)
     volumes[real] = volumes_of(estimate.shapes[real])
     volumes[estimate.is_body] = estimate.volumes[estimate.is_body]
-    relative_errors = np.abs(volumes[real] / truth.volume[rows][real] - 1.0)
+    relative_errors = np.abs(volumes[real] / truth.volumes[rows][real] - 1.0)
     return Report(
         rmse_pos=position_error(truth.pose_model, estimate.poses, truth.poses),
         odometry_rmse_pos=position_error(truth.pose_model, estimate.initial_poses, truth.poses),
-        rmse_landmark=mean_distance(estimate.centers, truth.center[rows]),
+        rmse_landmark=mean_distance(estimate.centers, truth.centers[rows]),
         rmse_volume=float(volume_errors.mean()),
         mapped=len(rows),
         not_ellipsoids=int((~real).sum()),
@@ -131,7 +131,7 @@ def box_volumes(shapes: Floats) -> Floats:
 
 def true_rows(object_ids: Ints, truth: Truth) -> Ints:
     """Return the row in the truth of each mapped object, shape (o,)."""
-    row_of = {int(object_id): row for row, object_id in enumerate(truth.object_id)}
+    row_of = {int(object_id): row for row, object_id in enumerate(truth.object_ids)}
     unknown = [int(object_id) for object_id in object_ids if int(object_id) not in row_of]
     if unknown:
         raise ValueError(f"object {unknown[0]} of the estimate is not in the truth")

@@ -37,9 +37,9 @@ def commit(state: State, local: LocalMap) -> Ints:
     called = scene.labels.votes[new].argmax(axis=1)
     priors = [scene.size_prior.of(scene.class_names[one]) for one in called.tolist()]
     moved = after.object_rows != before.object_rows
-    _relabel(state, after, moved, before.left_out, scene.ellipsoids[new], priors)
-    judged = before.left_out.keys() ^ after.left_out.keys()
-    _relabel(state, after, np.isin(after.object_rows, list(judged)), after.left_out)
+    _relabel(state, after, moved, before.dropped, scene.ellipsoids[new], priors)
+    judged = before.dropped.keys() ^ after.dropped.keys()
+    _relabel(state, after, np.isin(after.object_rows, list(judged)), after.dropped)
     store.labels = after
     named = state.settings.trust == FINAL
     ids = [store.tracker_id_of(row) if named else ANY_ID for row in rows[new].tolist()]
@@ -78,11 +78,11 @@ def _merged(known: Labels, local: LocalMap, part: slice, rows: Ints, count: int)
     own[:begun] = _changed(own[:begun], kept[base.object_of_tracklet], found[:begun])
     own[begun : len(found)] = found[begun:]  # of tracklets that were cut
     merged.object_of_tracklet = own
-    left_out = {ObjectRow(int(rows[row])): why for row, why in now.left_out.items()}
-    asked = known.left_out.keys() | left_out.keys()
-    free = {row for row in asked if known.left_out.get(row) == base.left_out.get(row)}
-    merged.left_out = {row: why for row, why in known.left_out.items() if row not in free}
-    merged.left_out |= {row: why for row, why in left_out.items() if row in free and row >= 0}
+    dropped = {ObjectRow(int(rows[row])): why for row, why in now.dropped.items()}
+    asked = known.dropped.keys() | dropped.keys()
+    free = {row for row in asked if known.dropped.get(row) == base.dropped.get(row)}
+    merged.dropped = {row: why for row, why in known.dropped.items() if row not in free}
+    merged.dropped |= {row: why for row, why in dropped.items() if row in free and row >= 0}
     return merged
 
 
@@ -95,7 +95,7 @@ def _relabel(
     state: State,
     labels: Labels,
     changed: Bools,
-    left_out: Collection[ObjectRow],
+    dropped: Collection[ObjectRow],
     ellipsoids: Floats = _NO_ELLIPSOIDS,
     priors: Sequence[SizePrior] = (),
 ) -> None:
@@ -108,7 +108,7 @@ def _relabel(
     shown = labels.object_rows[changed]
     state.core.relabel(
         state.store.observation_rows[changed],
-        np.where(np.isin(shown, list(left_out)), -1, shown),
+        np.where(np.isin(shown, list(dropped)), -1, shown),
         ellipsoids,
         np.array([prior.log_mean for prior in priors]),
         np.array([prior.log_sigma for prior in priors]),

@@ -173,10 +173,10 @@ class Identifier:
         """
         labels = local.scene.labels
         local.scene.learn_size(labels.shown_objects)
-        stays = {row: why for row, why in labels.left_out.items() if row not in self._misfits}
+        stays = {row: why for row, why in labels.dropped.items() if row not in self._misfits}
         misfits = find_misfits(local.scene)
         self._misfits = set(misfits)
-        labels.left_out = misfits | stays
+        labels.dropped = misfits | stays
         self._commit(local)
         departed = [row for row in labels.shown_objects.tolist() if self._has_departed(row)]
         self._judged_keyframes = len(self._state.store.keyframes)
@@ -187,10 +187,10 @@ class Identifier:
     def _judge_motion(self, suspects: list[ObjectRow], local: LocalMap) -> None:
         """Leave out those of some objects that have moved, or whose ids name several things."""
         scene, labels = local.scene, local.scene.labels
-        labels.left_out = labels.left_out | find_movers(scene, suspects)
+        labels.dropped = labels.dropped | find_movers(scene, suspects)
         if self._state.settings.trust == FINAL:
             scattered = find_scattered(scene)
-            labels.left_out |= {row: scattered[row] for row in suspects if row in scattered}
+            labels.dropped |= {row: scattered[row] for row in suspects if row in scattered}
         self._commit(local)
 
     def _judge_noise(self, local: LocalMap) -> None:

@@ -84,9 +84,9 @@ class SessionReader:
 
     @property
     @locked
-    def left_out(self) -> dict[int, str]:
+    def dropped(self) -> dict[int, str]:
         """Reasons why objects do not fit a world at rest, by id; their boxes are not used."""
-        return self._state.left_out
+        return self._state.dropped
 
     @property
     @locked

@@ -52,5 +52,5 @@ def read_estimate(state: State) -> Estimate:
         observations=objects.observations[order],
         dual_quadrics=objects.dual_quadrics[order],
         ellipsoids=objects.ellipsoids[order],
-        dropped=dict(sorted(state.left_out.items())),
+        dropped=dict(sorted(state.dropped.items())),
     )

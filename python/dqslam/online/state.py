@@ -83,18 +83,18 @@ class State:
         return self.store.odometry_noise if self.settings.estimates_noise else None
 
     @property
-    def left_out(self) -> dict[int, str]:
+    def dropped(self) -> dict[int, str]:
         """Reasons why objects do not fit a world at rest, by id."""
-        return {self.registry.ids[row]: why for row, why in self.store.labels.left_out.items()}
+        return {self.registry.ids[row]: why for row, why in self.store.labels.dropped.items()}
 
     @property
     def object_rows(self) -> list[ObjectRow]:
         """Rows of the objects in the map, which are not left out and have a box with a class."""
-        left_out, labels = self.store.labels.left_out, self.store.labels
+        dropped, labels = self.store.labels.dropped, self.store.labels
         named = labels.box_counts
         votes = self.registry.votes
         return [
             ObjectRow(row)
             for row in range(self.core.num_objects)
-            if row not in left_out and (votes[row] or (row < len(named) and named[row]))
+            if row not in dropped and (votes[row] or (row < len(named) and named[row]))
         ]

@@ -106,14 +106,16 @@ def _finish(
     path = _core.dead_reckon(odometry.pose_model, odometry.first_pose, odometry.relative)
     graph = found.scene.graph()
     if graph is None:
-        return _nothing(recording, path, found.left_out), None, None, (), None
+        return _nothing(recording, path, found.dropped), None, None, (), None
     graph, solved, summary = _solve_exactly(
         recording.camera, graph, found.scene.state(graph), solver
     )
-    ids = found.ids[solved.object_ids]
+    ids = found.object_ids[solved.object_ids]
     order = np.argsort(ids)
     order = order[ids[order] >= 0]  # those without a box, now that all images are seen, are gone
-    dropped = {int(found.ids[row]): why for row, why in solved.dropped.items()} | found.left_out
+    dropped = {
+        int(found.object_ids[row]): why for row, why in solved.dropped.items()
+    } | found.dropped
     dropped.pop(-1, None)
     nothing = _nothing(recording, path, dropped)
     if not order.size:
@@ -130,9 +132,9 @@ def _finish(
         dual_quadrics=solved.dual_quadrics[order],
         ellipsoids=solved.ellipsoids[order],
         contradicted={
-            int(found.ids[row]): why
+            int(found.object_ids[row]): why
             for row, why in solved.contradicted.items()
-            if found.ids[row] in ids[order]
+            if found.object_ids[row] in ids[order]
         },
     )
     poses = np.full((len(path), *marginals.poses.shape[1:]), np.nan)
@@ -233,7 +235,7 @@ def _solve_exactly(
 
 def _named(part: UnderConstrained, found: Association) -> UnderConstrained:
     """Name a pose by its row in the recording and an object by its id, not as in the solve."""
-    names = found.keyframes if part.kind == "pose" else found.ids
+    names = found.keyframes if part.kind == "pose" else found.object_ids
     return replace(part, name=int(names[part.name]))
 
 

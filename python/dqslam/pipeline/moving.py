@@ -46,11 +46,13 @@ def without_movers(found: Association, options: RunOptions) -> Association:
     )
     if not moving:
         return found
-    labels.left_out = labels.left_out | moving
+    labels.dropped = labels.dropped | moving
     scene.estimate(max_iterations=_ITERATIONS)
     scene.estimate_noise()
-    named = {int(found.ids[row]): why for row, why in moving.items() if found.ids[row] >= 0}
-    return replace(found, left_out=dict(sorted((found.left_out | named).items())))
+    named = {
+        int(found.object_ids[row]): why for row, why in moving.items() if found.object_ids[row] >= 0
+    }
+    return replace(found, dropped=dict(sorted((found.dropped | named).items())))
 
 
 def moving_objects(

@@ -75,7 +75,7 @@ def estimate_online(
 def _estimate(slam: OnlineSlam, recording: Recording) -> Estimate:
     """Return the estimate, and say of final ids without an object why that is."""
     estimate = slam.estimate()
-    ids = np.array([*slam.objects.object_ids, *slam.left_out], dtype=np.int64)
+    ids = np.array([*slam.objects.object_ids, *slam.dropped], dtype=np.int64)
     used = np.isin(recording.detections.pose, slam.keyframes)
     dropped = {**estimate.dropped, **not_found(recording, ids, used)}
     return replace(estimate, dropped=dict(sorted(dropped.items())))

@@ -105,11 +105,11 @@ def _draw_path(axes: "Axes", poses: Floats, **style: Any) -> None:
 def _true_outlines(truth: Truth) -> list[Floats]:
     """Return the outlines of the true objects from above, each (2, n), meters."""
     if truth.ellipsoids is None:
-        radii = np.cbrt(0.75 / np.pi * truth.volume)
+        radii = np.cbrt(0.75 / np.pi * truth.volumes)
         shapes = radii[:, None, None] ** 2 * np.eye(3)
     else:
         shapes = _core.ellipsoid_shapes(truth.ellipsoids)
-    return [_outline(*one) for one in zip(truth.center, shapes, strict=True)]
+    return [_outline(*one) for one in zip(truth.centers, shapes, strict=True)]
 
 
 def _outline(center: Floats, shape: Floats) -> Floats:

@@ -17,13 +17,13 @@ class Truth:
     pose_model: PoseModel
     poses: Floats
     """world_from_robot, shape (n, d)."""
-    object_id: Ints
-    """Id of every object of the world, detected or not; shape (o,)."""
-    center: Floats
+    object_ids: Ints
+    """Ids of all objects of the world, detected or not; shape (o,)."""
+    centers: Floats
     """Centers in the world, meters, shape (o, 3)."""
-    volume: Floats
+    volumes: Floats
     """Cubic meters, shape (o,)."""
-    class_name: tuple[str, ...]
+    class_names: tuple[str, ...]
     """One per object."""
     ellipsoids: Floats | None = None
     """Center and log-Cholesky shape, shape (o, 9); None if the objects are no ellipsoids."""
@@ -35,14 +35,14 @@ class Truth:
 
     def __post_init__(self) -> None:
         """Check shapes and numbers."""
-        object_id = as_ints("truth.object_id", self.object_id)
-        count = len(object_id)
-        if len(set(object_id.tolist())) != count:
-            raise ValueError("truth.object_id: an id occurs twice")
-        if len(self.class_name) != count:
-            raise ValueError(f"truth.class_name: expected {count}, got {len(self.class_name)}")
-        volume = as_floats("truth.volume", self.volume, [count])
-        reject_rows("truth.volume", volume <= 0.0, "not positive", volume)
+        object_ids = as_ints("truth.object_ids", self.object_ids)
+        count = len(object_ids)
+        if len(set(object_ids.tolist())) != count:
+            raise ValueError("truth.object_ids: an id occurs twice")
+        if len(self.class_names) != count:
+            raise ValueError(f"truth.class_names: expected {count}, got {len(self.class_names)}")
+        volumes = as_floats("truth.volumes", self.volumes, [count])
+        reject_rows("truth.volumes", volumes <= 0.0, "not positive", volumes)
         ellipsoids = self.ellipsoids
         if ellipsoids is not None:
             ellipsoids = as_floats("truth.ellipsoids", ellipsoids, [count, 9])
@@ -52,15 +52,15 @@ class Truth:
         box_object_id = self.box_object_id
         if box_object_id is not None:
             box_object_id = as_ints("truth.box_object_id", box_object_id)
-            unknown = ~np.isin(box_object_id, [-1, *object_id])
+            unknown = ~np.isin(box_object_id, [-1, *object_ids])
             reject_rows("truth.box_object_id", unknown, "no such object", box_object_id)
         assign(
             self,
             poses=as_poses("truth.poses", self.poses, self.pose_model),
-            object_id=object_id,
-            center=as_floats("truth.center", self.center, [count, 3]),
-            volume=volume,
-            class_name=tuple(self.class_name),
+            object_ids=object_ids,
+            centers=as_floats("truth.centers", self.centers, [count, 3]),
+            volumes=volumes,
+            class_names=tuple(self.class_names),
             ellipsoids=ellipsoids,
             cuboids=cuboids,
             box_object_id=box_object_id,
@@ -68,5 +68,5 @@ class Truth:
 
     def __repr__(self) -> str:
         """Show how many poses and objects there are."""
-        objects = counted(len(self.object_id), "object")
+        objects = counted(len(self.object_ids), "object")
         return f"Truth({self.pose_model.name}, {counted(len(self.poses), 'pose')}, {objects})"

@@ -58,7 +58,7 @@ def simulate(scenario: Scenario, *, seed: int) -> tuple[Recording, Truth]:
     streams = Streams(for_boxes, for_ids, for_tails, for_misses, for_bursts, for_false)
     camera = true_camera(scenario.camera)
     detections, object_row = detect(
-        box, is_seen, world.center, truth.class_name, camera, scenario.detector, streams
+        box, is_seen, world.center, truth.class_names, camera, scenario.detector, streams
     )
     period = scenario.path.period_s
     recording = Recording(
@@ -70,7 +70,7 @@ def simulate(scenario: Scenario, *, seed: int) -> tuple[Recording, Truth]:
         detections=detections,
         positions=_positions(scenario, motion, world, (detections.pose, object_row), for_positions),
     )
-    shown = np.where(object_row < 0, -1, truth.object_id[object_row])
+    shown = np.where(object_row < 0, -1, truth.object_ids[object_row])
     truth = replace(truth, box_object_id=shown)
     recording = _only_with_boxes(recording)
     gaps = scenario.odometry.gaps

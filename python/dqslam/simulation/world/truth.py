@@ -25,10 +25,10 @@ def true_answer(scenario: Scenario, motion: TruePath, world: World) -> Truth:
     return Truth(
         pose_model=motion.pose_model,
         poses=motion.poses,
-        object_id=np.arange(count),
-        center=world.center,
-        volume=volume,
-        class_name=_class_names(
+        object_ids=np.arange(count),
+        centers=world.center,
+        volumes=volume,
+        class_names=_class_names(
             scenario.objects.removesuffix("s"), scenario.world.class_count, count
         ),
         ellipsoids=ellipsoids,

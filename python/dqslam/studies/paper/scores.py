@@ -76,9 +76,9 @@ def score_bound(
     covariance = marginal_covariances(graph, estimate, options)
     pose_error = tangent_errors(truth.pose_model, truth.poses, estimate.poses)[1:]
     pose_nees = normalized_squares(pose_error, covariance.poses[1:])
-    exists = np.isin(estimate.object_ids, truth.object_id)
+    exists = np.isin(estimate.object_ids, truth.object_ids)
     rows = true_rows(estimate.object_ids[exists], truth)
-    center_error = truth.center[rows] - estimate.centers[exists]
+    center_error = truth.centers[rows] - estimate.centers[exists]
     center_nees = normalized_squares(center_error, covariance.centers[exists])
     cost = truncated_cost(solved, options)
     from_truth = solve(graph, options, start=true_state(graph, truth, options))
@@ -117,7 +117,7 @@ def score_robust(
         precision=float(found.sum() / max(estimate.inliers.sum(), 1)),
         recall=float(found.sum() / max(right.sum(), 1)),
         oracle_rmse_pos=position_error(truth.pose_model, oracle.poses, truth.poses),
-        oracle_rmse_landmark=mean_distance(oracle_centers, truth.center[true_rows(shared, truth)]),
+        oracle_rmse_landmark=mean_distance(oracle_centers, truth.centers[true_rows(shared, truth)]),
         dropped=len(estimate.dropped),
     )
 

@@ -175,11 +175,11 @@ def _gives_up(graph: Graph, estimate: Estimate) -> bool:
 
 
 def _errors(estimate: Estimate, truth: Truth) -> WorldSolve:
-    exists = np.isin(estimate.object_ids, truth.object_id)
+    exists = np.isin(estimate.object_ids, truth.object_ids)
     rows = true_rows(estimate.object_ids[exists], truth)
     return WorldSolve(
         position_error=position_error(truth.pose_model, estimate.poses, truth.poses),
-        center_error=_mean(np.linalg.norm(estimate.centers[exists] - truth.center[rows], axis=1)),
+        center_error=_mean(np.linalg.norm(estimate.centers[exists] - truth.centers[rows], axis=1)),
         mapped=len(rows),
     )
 
@@ -191,10 +191,10 @@ def _nees(estimate: Estimate, marginals: Marginals | None, truth: Truth) -> tupl
     known = np.flatnonzero(np.isfinite(marginals.poses).all(axis=(1, 2)))
     known = known[known > 0]  # the first pose is fixed
     error = tangent_errors(truth.pose_model, truth.poses[known], estimate.poses[known])
-    exists = np.isin(estimate.object_ids, truth.object_id)
+    exists = np.isin(estimate.object_ids, truth.object_ids)
     exists &= np.isfinite(marginals.centers).all(axis=(1, 2))
     rows = true_rows(estimate.object_ids[exists], truth)
-    center_error = truth.center[rows] - estimate.centers[exists]
+    center_error = truth.centers[rows] - estimate.centers[exists]
     return (
         _mean(normalized_squares(error, marginals.poses[known])),
         _mean(normalized_squares(center_error, marginals.centers[exists])),
