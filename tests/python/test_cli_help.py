@@ -74,11 +74,13 @@ def test_the_module_is_the_program():
 
 
 def test_an_option_is_of_one_type_in_all_commands():
-    """The choices, or else the type, of an option are the same wherever it is."""
+    """The choices, or else the type, of an option are the same wherever help shows it."""
     kinds = defaultdict(lambda: defaultdict(list))
     for name, command in COMMANDS.items():
         hints = get_type_hints(inspect.unwrap(command.callback))
         for parameter in command.params:
+            if getattr(parameter, "hidden", False):  # earlier names, which still work
+                continue
             hint = hints.get(parameter.name)
             kind = frozenset(get_args(hint)) - {type(None)} or frozenset({hint})
             if kind == {list[str]}:  # one that may be repeated

@@ -45,7 +45,8 @@ def test_table_and_figure(tmp_path, capsys):
 
 def test_the_papers_method_shows_its_scan(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(methods, "ALGEBRAIC_SIGMAS", (1e10, 1e15))
-    command = ["paper", "--trials", "1", "--method", "paper", "--object-kind", "ellipsoids"]
+    # The earlier name of --object-kind still works.
+    command = ["paper", "--trials", "1", "--method", "paper", "--objects", "ellipsoids"]
     assert main([*command, "--out", str(tmp_path), "--jobs", "1"]) == 0
     table = json.loads((tmp_path / "table.json").read_text())
     assert (table["method"], table["objects"]) == ("paper", "ellipsoids")

@@ -64,6 +64,10 @@ def paper(
             "scenario.",
         ),
     ] = None,
+    objects: Annotated[
+        Literal["cubes", "ellipsoids"] | None,
+        typer.Option(hidden=True, help="The earlier name of --object-kind."),
+    ] = None,
     method: Annotated[
         Literal["dqslam", "paper"],
         typer.Option(help="dqslam: the default estimator; paper: the published method."),
@@ -120,7 +124,7 @@ def paper(
         "wrong_association_kind": wrong_association_kind or wrong_kind,
     }
     changes = {
-        "objects": object_kind or chosen.objects,
+        "objects": object_kind or objects or chosen.objects,
         "detector": chosen.detector.model_copy(update=wrong),
     }
     output = Output(quiet=quiet, as_json=json)
