@@ -271,7 +271,7 @@ def test_classes_as_ids_on_a_real_desk(tmp_path):
     assert found["found"] + found["missed"] == 27
     assert 0.2 < found["precision"] < found["purity"] < 1.0
     # A box that shows nobody knows what is not judged.
-    known = np.isin(truth.object_ids, -1, invert=True)
+    known = np.isin(truth.object_id, -1, invert=True)
     assert 0 < found["boxes"] <= known.sum() < len(truth.box)
 
 

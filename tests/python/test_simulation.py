@@ -67,7 +67,7 @@ def test_new_kinds_of_errors_leave_the_numbers_of_older_scenarios():
         (orbit.odometry.relative[7][:3], [0.00294181204011, -0.0914550853574, -0.0252925192357]),
         (orbit.detections.box[11], [462.575802901, 229.522193481, 518.427265768, 280.557029125]),
         (orbited.poses[9][:3], [1.033848838304, 0.661617642278, 0.482700204733]),
-        (orbited.center[4], [0.282518303985, 0.361590198844, 0.0873762192222]),
+        (orbited.centers[4], [0.282518303985, 0.361590198844, 0.0873762192222]),
     ]
     for drawn, before in numbers:
         np.testing.assert_allclose(drawn, before, rtol=1e-9)
@@ -77,7 +77,7 @@ def test_new_kinds_of_errors_leave_the_numbers_of_older_scenarios():
 def test_the_kind_of_objects_changes_nothing_but_the_boxes():
     (cubes, true_cubes), (ellipsoids, true_ellipsoids) = paper("cubes"), paper("ellipsoids")
     np.testing.assert_array_equal(cubes.odometry.relative, ellipsoids.odometry.relative)
-    np.testing.assert_array_equal(true_cubes.center, true_ellipsoids.center)
+    np.testing.assert_array_equal(true_cubes.centers, true_ellipsoids.centers)
     some = by_pair(cubes, cubes.positions.object_in_robot)
     others = by_pair(ellipsoids, ellipsoids.positions.object_in_robot)
     both = some.keys() & others.keys()
@@ -180,12 +180,12 @@ def test_an_object_that_is_never_detected_is_in_the_truth_only():
 def test_volumes_are_those_of_the_shapes():
     cubes, ellipsoids = paper("cubes")[1], paper("ellipsoids")[1]
     assert cubes.ellipsoids is None
-    assert cubes.volume.min() >= 0.2**3
+    assert cubes.volumes.min() >= 0.2**3
     for row in range(10):
         center, semi_axes, _ = _core.axes_from_ellipsoid(ellipsoids.ellipsoids[row])
-        np.testing.assert_allclose(center, ellipsoids.center[row])
-        np.testing.assert_allclose(ellipsoids.volume[row], 4.0 / 3.0 * np.pi * np.prod(semi_axes))
-        factors = 2.0 * semi_axes / np.cbrt(cubes.volume[row])
+        np.testing.assert_allclose(center, ellipsoids.centers[row])
+        np.testing.assert_allclose(ellipsoids.volumes[row], 4.0 / 3.0 * np.pi * np.prod(semi_axes))
+        factors = 2.0 * semi_axes / np.cbrt(cubes.volumes[row])
         assert factors.min() >= 0.8 - 1e-9
         assert factors.max() <= 1.4 + 1e-9
 

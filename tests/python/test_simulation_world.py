@@ -55,7 +55,7 @@ def test_upright_objects_stand_on_their_third_axis():
 
 def test_other_numbers_of_the_world_stay():
     np.testing.assert_array_equal(
-        simulate(proportioned(), seed=3)[1].center, simulate(PAPER, seed=3)[1].center
+        simulate(proportioned(), seed=3)[1].centers, simulate(PAPER, seed=3)[1].centers
     )
 
 
@@ -119,7 +119,7 @@ def test_objects_are_beside_a_corridor(name):
     scenario = load_scenario(name)
     world, across = scenario.world, []
     for seed in range(5):
-        center = simulate(scenario, seed=seed)[1].center
+        center = simulate(scenario, seed=seed)[1].centers
         assert len(center) == world.object_count
         assert -0.1 < center[:, 0].min() < center[:, 0].max() < 60.1
         across.append(center[:, 1])
