@@ -57,8 +57,8 @@ def test_covariances_are_those_of_the_bodies(
     graph, estimate = solved
     marginals = dq.marginal_covariances(graph, estimate)
     assert marginals.under_constrained == ()
-    rows = [cubes[1].object_id.tolist().index(each) for each in estimate.object_ids]
-    errors = cubes[1].center[rows] - estimate.centers
+    rows = [cubes[1].object_ids.tolist().index(each) for each in estimate.object_ids]
+    errors = cubes[1].centers[rows] - estimate.centers
     assert 0.2 < np.median(normalized_squares(errors, marginals.centers)) < 3.0
 
 
