@@ -28,7 +28,7 @@ class EliminationTest : public testing::TestWithParam<int> {
   Random random_{static_cast<unsigned>(GetParam())};
   Pattern pattern_ = GetParam() % 2 ? RandomPattern(40, 10 * GetParam(), random_)
                                     : ChainWithObjects(90, 3, 2 * GetParam(), 3, random_);
-  BlockMatrix A_;
+  BlockPattern A_;
   Elimination elimination_;
 };
 
@@ -106,7 +106,7 @@ TEST_P(EliminationTest, UpdatesDoNotMeetOnTheirStacks) {
 TEST(Elimination, UpdatesThatWaitDoNotGrowWithTheDrive) {
   const auto Stacks = [](int poses) {
     const Pattern pattern = Drive(poses);
-    const Elimination elimination(BlockMatrix(pattern.sizes, pattern.pairs));
+    const Elimination elimination(BlockPattern(pattern.sizes, pattern.pairs));
     return std::accumulate(
         elimination.stack_size.begin(), elimination.stack_size.end(), std::ptrdiff_t{0});
   };
@@ -117,7 +117,7 @@ TEST(Elimination, UpdatesThatWaitDoNotGrowWithTheDrive) {
 // on.
 TEST(Elimination, SubtreesAreApart) {
   const Pattern pattern = MeetingDrives(40, 500);
-  const Elimination elimination(BlockMatrix(pattern.sizes, pattern.pairs));
+  const Elimination elimination(BlockPattern(pattern.sizes, pattern.pairs));
   ASSERT_GE(elimination.subtrees.size(), 30u);
   for (size_t s = 0; s < elimination.subtrees.size(); ++s) {
     const auto [begin, end] = elimination.subtrees[s];

@@ -27,7 +27,7 @@ int FrontOf(const FrontTree& tree, int position) {
 
 TEST(FrontTree, EliminatesEachBlockOnce) {
   for (const Pattern& pattern : Patterns()) {
-    const FrontTree tree(BlockMatrix(pattern.sizes, pattern.pairs));
+    const FrontTree tree(BlockPattern(pattern.sizes, pattern.pairs));
     const std::set<int> blocks(tree.order.begin(), tree.order.end());
     EXPECT_EQ(blocks.size(), pattern.sizes.size());
     EXPECT_EQ(tree.order.size(), pattern.sizes.size());
@@ -41,7 +41,7 @@ TEST(FrontTree, EliminatesEachBlockOnce) {
 // pivot, and what a front updates is in its parent, which comes later.
 TEST(FrontTree, HoldsCouplingsAndUpdates) {
   for (const Pattern& pattern : Patterns()) {
-    const BlockMatrix A(pattern.sizes, pattern.pairs);
+    const BlockPattern A(pattern.sizes, pattern.pairs);
     const FrontTree tree(A);
     std::vector<int> position(A.num_blocks());
     for (int k = 0; k < A.num_blocks(); ++k) position[tree.order[k]] = k;
@@ -71,7 +71,7 @@ TEST(FrontTree, HoldsCouplingsAndUpdates) {
 // In postorder a subtree is a run of fronts: it begins where the first of its leaves is.
 TEST(FrontTree, ComesInPostorder) {
   for (const Pattern& pattern : Patterns()) {
-    const FrontTree tree(BlockMatrix(pattern.sizes, pattern.pairs));
+    const FrontTree tree(BlockPattern(pattern.sizes, pattern.pairs));
     std::vector<int> begin(tree.num_fronts()), size(tree.num_fronts(), 1);
     for (int front = 0; front < tree.num_fronts(); ++front) begin[front] = front;
     for (int front = 0; front < tree.num_fronts(); ++front) {
@@ -86,7 +86,7 @@ TEST(FrontTree, ComesInPostorder) {
 
 double FactorEntries(int poses) {
   const Pattern pattern = Drive(poses);
-  const BlockMatrix A(pattern.sizes, pattern.pairs);
+  const BlockPattern A(pattern.sizes, pattern.pairs);
   const FrontTree tree(A);
   double entries = 0;
   for (int front = 0; front < tree.num_fronts(); ++front) {

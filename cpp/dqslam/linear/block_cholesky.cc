@@ -26,19 +26,19 @@ auto BelowOf(const double* factor, const Front& front) {
 
 }  // namespace
 
-BlockCholesky::BlockCholesky(const BlockMatrix& A, int threads)
-    : elimination_(A),
+BlockCholesky::BlockCholesky(std::shared_ptr<const Elimination> elimination, int threads)
+    : elimination_(std::move(elimination)),
       threads_(threads),
-      factor_(elimination_.fronts.back().factor + kFrontPadding) {
-  stacks_.resize(elimination_.stack_size.size());
-  for (int s = 0; s < 2; ++s) stacks_[s].resize(elimination_.stack_size[s]);
-  for (int f = 0; f < elimination_.num_fronts(); ++f) {
-    if (elimination_.fronts[f].stack < 2) others_.push_back(f);
+      factor_(elimination_->fronts.back().factor + kFrontPadding) {
+  stacks_.resize(elimination_->stack_size.size());
+  for (int s = 0; s < 2; ++s) stacks_[s].resize(elimination_->stack_size[s]);
+  for (int f = 0; f < elimination_->num_fronts(); ++f) {
+    if (elimination_->fronts[f].stack < 2) others_.push_back(f);
   }
 }
 
 bool BlockCholesky::Factorize(const BlockMatrix& A, const VectorXd& damping) {
-  const size_t rows = elimination_.place.size(), blocks = elimination_.blocks.size();
+  const size_t rows = elimination_->place.size(), blocks = elimination_->blocks.size();
   if (static_cast<size_t>(A.rows()) != rows || static_cast<size_t>(damping.size()) != rows ||
       static_cast<size_t>(A.num_blocks() + A.num_off_diagonal()) != blocks) {
     throw std::invalid_argument(
@@ -49,20 +49,20 @@ bool BlockCholesky::Factorize(const BlockMatrix& A, const VectorXd& damping) {
   }
   VectorXd placed_damping(damping.size());
   for (Eigen::Index r = 0; r < damping.size(); ++r) {
-    placed_damping[elimination_.place[r]] = damping[r];
+    placed_damping[elimination_->place[r]] = damping[r];
   }
-  const int subtrees = static_cast<int>(elimination_.subtrees.size());
+  const int subtrees = static_cast<int>(elimination_->subtrees.size());
   std::atomic<bool> positive{true};
   ParallelFor(threads_, subtrees, [&](int s) {
-    const auto [begin, end] = elimination_.subtrees[s];
+    const auto [begin, end] = elimination_->subtrees[s];
     for (const int stack : {2 * s + 2, 2 * s + 3}) {
-      stacks_[stack].resize(elimination_.stack_size[stack]);
+      stacks_[stack].resize(elimination_->stack_size[stack]);
     }
     for (int f = begin; f < end && positive; ++f) {
       if (!Eliminate(A, placed_damping, f)) positive = false;
     }
     // Only the update of the last front waits on, at the bottom of its stack.
-    const Front& last = elimination_.fronts[end - 1];
+    const Front& last = elimination_->fronts[end - 1];
     stacks_[last.stack].conservativeResize(std::ptrdiff_t{last.below} * last.below);
     stacks_[last.stack ^ 1].resize(0);
   });
@@ -72,7 +72,7 @@ bool BlockCholesky::Factorize(const BlockMatrix& A, const VectorXd& damping) {
 }
 
 bool BlockCholesky::Eliminate(const BlockMatrix& A, const VectorXd& placed_damping, int f) {
-  const Front& front = elimination_.fronts[f];
+  const Front& front = elimination_->fronts[f];
   PlaceBlocks(A, f);
   for (int c = 0; c < front.pivots; ++c) {
     Factor(f)[std::ptrdiff_t{c} * (front.rows() + 1)] += placed_damping[front.pivot + c];
@@ -83,11 +83,11 @@ bool BlockCholesky::Eliminate(const BlockMatrix& A, const VectorXd& placed_dampi
 
 // Copies the entries of A into the columns of a front.
 void BlockCholesky::PlaceBlocks(const BlockMatrix& A, int f) {
-  const Front& front = elimination_.fronts[f];
+  const Front& front = elimination_->fronts[f];
   const std::ptrdiff_t stride = front.rows();
   std::fill_n(Factor(f), stride * front.pivots, 0.0);
-  for (int k = front.block; k < elimination_.fronts[f + 1].block; ++k) {
-    const PlacedBlock& placed = elimination_.blocks[k];
+  for (int k = front.block; k < elimination_->fronts[f + 1].block; ++k) {
+    const PlacedBlock& placed = elimination_->blocks[k];
     double* to = Factor(f) + placed.column * stride + placed.row;
     if (placed.index < 0) {
       const int block = -1 - placed.index, size = A.size(block);
@@ -111,15 +111,15 @@ void BlockCholesky::PlaceBlocks(const BlockMatrix& A, int f) {
 // Sets the update of a front to zero, then adds the updates of its children to it and to the
 // columns.
 void BlockCholesky::AddUpdates(int f) {
-  const Front& front = elimination_.fronts[f];
+  const Front& front = elimination_->fronts[f];
   for (int c = 0; c < front.below; ++c) {
     std::fill_n(Update(f) + std::ptrdiff_t{c} * (front.below + 1), front.below - c, 0.0);
   }
-  for (int k = front.child; k < elimination_.fronts[f + 1].child; ++k) {
-    const Child& child = elimination_.children[k];
-    const RowRun* const end = elimination_.runs.data() + elimination_.children[k + 1].run;
-    const std::ptrdiff_t size = elimination_.fronts[child.front].below;
-    for (const RowRun* run = elimination_.runs.data() + child.run; run != end; ++run) {
+  for (int k = front.child; k < elimination_->fronts[f + 1].child; ++k) {
+    const Child& child = elimination_->children[k];
+    const RowRun* const end = elimination_->runs.data() + elimination_->children[k + 1].run;
+    const std::ptrdiff_t size = elimination_->fronts[child.front].below;
+    for (const RowRun* run = elimination_->runs.data() + child.run; run != end; ++run) {
       for (int c = 0; c < run->length; ++c) {
         const double* from = Update(child.front) + (run->from + c) * size;
         const int column = run->to + c;
@@ -137,7 +137,7 @@ void BlockCholesky::AddUpdates(int f) {
 }
 
 VectorXd BlockCholesky::Solve(const VectorXd& b) const {
-  const Elimination& e = elimination_;
+  const Elimination& e = *elimination_;
   const int subtrees = static_cast<int>(e.subtrees.size());
   int most_below = 0;
   for (const Front& front : e.fronts) most_below = std::max(most_below, front.below);

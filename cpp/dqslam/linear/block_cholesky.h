@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <memory>
 #include <vector>
 
 #include "dqslam/linear/block_matrix.h"
@@ -13,8 +14,11 @@ namespace dqslam {
 /// of A change. It runs in one thread and gives the same bits each time.
 class BlockCholesky {
  public:
+  /// Of matrices with the pattern that was laid out.
+  explicit BlockCholesky(std::shared_ptr<const Elimination> elimination, int threads = 1);
   /// Orders the blocks and lays out the factor. This needs only the pattern of A.
-  explicit BlockCholesky(const BlockMatrix& A, int threads = 1);
+  explicit BlockCholesky(const BlockMatrix& A, int threads = 1)
+      : BlockCholesky(std::make_shared<Elimination>(*A.pattern()), threads) {}
 
   /// Factorizes A + diag(damping). `A` must have the pattern that the constructor was given, and
   /// `damping` has one entry per row of A.
@@ -30,13 +34,13 @@ class BlockCholesky {
   void PlaceBlocks(const BlockMatrix& A, int f);
   void AddUpdates(int f);
 
-  double* Factor(int f) { return factor_.data() + elimination_.fronts[f].factor; }
+  double* Factor(int f) { return factor_.data() + elimination_->fronts[f].factor; }
   double* Update(int f) {
-    const Front& front = elimination_.fronts[f];
+    const Front& front = elimination_->fronts[f];
     return stacks_[front.stack].data() + front.update;
   }
 
-  Elimination elimination_;
+  std::shared_ptr<const Elimination> elimination_;
   int threads_;
   std::vector<int> others_;  // the fronts of no subtree, ascending
   // Of a large matrix, the thread that first writes to memory of these two gets its pages.

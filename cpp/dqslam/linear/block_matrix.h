@@ -3,44 +3,49 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <memory>
 #include <utility>
 #include <vector>
 
+#include "dqslam/linear/block_pattern.h"
+
 namespace dqslam {
 
-/// A symmetric matrix. It stores all blocks on the diagonal and, once each, the requested blocks
-/// off the diagonal.
+/// A symmetric matrix with the blocks of a pattern.
 ///
 /// Blocks are column-major and contiguous, so that callers who know the sizes can accumulate
-/// through Eigen::Map<Eigen::Matrix<double, 3, 9>>. The pattern never changes; values start at
-/// zero.
+/// through Eigen::Map<Eigen::Matrix<double, 3, 9>>. Matrices can share a pattern; values
+/// start at zero.
 class BlockMatrix {
  public:
-  /// `sizes` are the rows of each block on the diagonal, at least 1. `pairs` are the blocks (i, j),
-  /// i != j, that are coupled; they may be in either order and may be repeated.
-  /// Throws std::invalid_argument that names the block or the pair.
-  BlockMatrix(std::vector<int> sizes, const std::vector<std::pair<int, int>>& pairs);
+  explicit BlockMatrix(std::shared_ptr<const BlockPattern> pattern)
+      : pattern_(std::move(pattern)), values_(pattern_->num_values(), 0.0) {}
+  /// With a pattern of its own, whose constructor has these arguments.
+  BlockMatrix(std::vector<int> sizes, const std::vector<std::pair<int, int>>& pairs)
+      : BlockMatrix(std::make_shared<BlockPattern>(std::move(sizes), pairs)) {}
 
-  int num_blocks() const { return static_cast<int>(sizes_.size()); }
-  int size(int block) const { return sizes_[block]; }
-  /// First row of a block; offset(num_blocks()) is the number of rows of A.
-  int offset(int block) const { return offsets_[block]; }
-  int rows() const { return offsets_.back(); }
-
-  /// Index of the block off the diagonal that belongs to the k-th entry of `pairs`.
-  int index_of_pair(size_t k) const { return index_of_pair_[k]; }
-  int num_off_diagonal() const { return static_cast<int>(coupled_.size()); }
-  /// The blocks (i, j), i < j, that a block off the diagonal couples.
-  std::pair<int, int> coupled(int index) const { return coupled_[index]; }
+  const std::shared_ptr<const BlockPattern>& pattern() const { return pattern_; }
+  int num_blocks() const { return pattern_->num_blocks(); }
+  int size(int block) const { return pattern_->size(block); }
+  int offset(int block) const { return pattern_->offset(block); }
+  int rows() const { return pattern_->rows(); }
+  int index_of_pair(size_t k) const { return pattern_->index_of_pair(k); }
+  int num_off_diagonal() const { return pattern_->num_off_diagonal(); }
+  int IndexOf(int i, int j) const { return pattern_->IndexOf(i, j); }
+  std::pair<int, int> coupled(int index) const { return pattern_->coupled(index); }
 
   /// A_ii, size(i) x size(i). Only the lower triangle, its diagonal included, is ever read.
-  double* Diagonal(int block) { return values_.data() + diagonal_start_[block]; }
-  const double* Diagonal(int block) const { return values_.data() + diagonal_start_[block]; }
+  double* Diagonal(int block) { return values_.data() + pattern_->diagonal_start(block); }
+  const double* Diagonal(int block) const {
+    return values_.data() + pattern_->diagonal_start(block);
+  }
 
   /// A_ij of (i, j) = coupled(index): its rows are those of the *smaller* block number, hence
   /// size(i) x size(j) with i < j.
-  double* OffDiagonal(int index) { return values_.data() + off_diagonal_start_[index]; }
-  const double* OffDiagonal(int index) const { return values_.data() + off_diagonal_start_[index]; }
+  double* OffDiagonal(int index) { return values_.data() + pattern_->off_diagonal_start(index); }
+  const double* OffDiagonal(int index) const {
+    return values_.data() + pattern_->off_diagonal_start(index);
+  }
 
   void SetZero(int threads = 1);
   Eigen::VectorXd diagonal() const;
@@ -48,10 +53,7 @@ class BlockMatrix {
   Eigen::VectorXd Multiply(const Eigen::VectorXd& x) const;
 
  private:
-  std::vector<int> sizes_, offsets_;
-  std::vector<std::pair<int, int>> coupled_;  // ascending
-  std::vector<int> index_of_pair_;
-  std::vector<std::ptrdiff_t> diagonal_start_, off_diagonal_start_;  // in values_
+  std::shared_ptr<const BlockPattern> pattern_;
   std::vector<double> values_;
 };
 

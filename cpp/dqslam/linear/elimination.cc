@@ -22,7 +22,7 @@ Lists ChildrenOf(const FrontTree& tree) {
 // Fills an Elimination, front by front.
 class Layout {
  public:
-  Layout(const BlockMatrix& A, const FrontTree& tree, Elimination& out)
+  Layout(const BlockPattern& A, const FrontTree& tree, Elimination& out)
       : A_(A), tree_(tree), children_(ChildrenOf(tree)), out_(out) {
     position_.resize(A.num_blocks());
     at_.resize(A.num_blocks());
@@ -161,7 +161,7 @@ class Layout {
     out_.stack_size[front.stack] = std::max(out_.stack_size[front.stack], top);
   }
 
-  const BlockMatrix& A_;
+  const BlockPattern& A_;
   const FrontTree& tree_;
   const Lists children_;
   Elimination& out_;
@@ -177,7 +177,7 @@ class Layout {
 
 }  // namespace
 
-Elimination::Elimination(const BlockMatrix& A) {
+Elimination::Elimination(const BlockPattern& A) {
   const FrontTree tree(A);
   Layout layout(A, tree, *this);
   layout.PlaceRows();

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "dqslam/linear/block_matrix.h"
+#include "dqslam/linear/block_pattern.h"
 #include "dqslam/linear/subtrees.h"
 
 namespace dqslam {
@@ -31,7 +31,7 @@ struct Front {
 
 /// Where a block of A goes among the columns of a front.
 struct PlacedBlock {
-  int index;  ///< as in BlockMatrix::OffDiagonal, or -1 - b for block b on the diagonal
+  int index;  ///< as in BlockPattern::coupled, or -1 - b for block b on the diagonal
   int row, column;
   bool transposed;
 };
@@ -50,7 +50,7 @@ struct Child {
 /// The symbolic half of a multifrontal factorization (Duff & Reid 1983). It depends only on the
 /// pattern.
 struct Elimination {
-  explicit Elimination(const BlockMatrix& A);
+  explicit Elimination(const BlockPattern& A);
 
   int num_fronts() const { return static_cast<int>(fronts.size()) - 1; }
 

@@ -11,7 +11,7 @@ using Lists = std::vector<std::vector<int>>;
 
 // Blocks in the order of elimination: approximate minimum degree (Amestoy, Davis & Duff 1996).
 // For graphs of boxes this needs less arithmetic than nested dissection of the path.
-std::vector<int> MinimumDegree(const BlockMatrix& A) {
+std::vector<int> MinimumDegree(const BlockPattern& A) {
   const int blocks = A.num_blocks();
   if (blocks == 0) return {};  // Eigen would read an empty sparse matrix out of bounds.
   Eigen::VectorXi entries = Eigen::VectorXi::Ones(blocks);
@@ -31,7 +31,7 @@ std::vector<int> MinimumDegree(const BlockMatrix& A) {
 
 // The blocks below the diagonal in each block column of the factor, ascending. Columns and blocks
 // are positions in `order`; the parent of a column is the first of its blocks.
-Lists FactorPattern(const BlockMatrix& A, const std::vector<int>& order) {
+Lists FactorPattern(const BlockPattern& A, const std::vector<int>& order) {
   const int blocks = A.num_blocks();
   std::vector<int> position(blocks), seen_by(blocks, -1);
   for (int k = 0; k < blocks; ++k) position[order[k]] = k;
@@ -67,7 +67,7 @@ double Cost(double pivots, double below) {
 
 // The columns of each front, ascending, in the list of its last column; the other lists are empty.
 // A child is merged into its parent where that is cheaper, even if the factor then stores zeros.
-Lists MergeColumns(const BlockMatrix& A, const std::vector<int>& order, const Lists& below) {
+Lists MergeColumns(const BlockPattern& A, const std::vector<int>& order, const Lists& below) {
   const int blocks = A.num_blocks();
   Lists merged(blocks), children(blocks);
   std::vector<double> pivots(blocks), rows(blocks, 0.0);
@@ -93,7 +93,7 @@ Lists MergeColumns(const BlockMatrix& A, const std::vector<int>& order, const Li
 
 // Orders the children of each front so that few updates wait at a time (Liu 1986). The first child
 // is the one whose subtree needs the most memory in addition to its own update.
-void SortChildren(const BlockMatrix& A,
+void SortChildren(const BlockPattern& A,
                   const std::vector<int>& order,
                   const Lists& below,
                   Lists& children) {
@@ -127,7 +127,7 @@ std::vector<int> Postorder(const Lists& children, const std::vector<int>& roots)
 
 }  // namespace
 
-FrontTree::FrontTree(const BlockMatrix& A) {
+FrontTree::FrontTree(const BlockPattern& A) {
   const std::vector<int> minimum_degree = MinimumDegree(A);
   Lists pattern = FactorPattern(A, minimum_degree);
   const Lists merged = MergeColumns(A, minimum_degree, pattern);

@@ -4,14 +4,14 @@
 
 #include <vector>
 
-#include "dqslam/linear/block_matrix.h"
+#include "dqslam/linear/block_pattern.h"
 
 namespace dqslam {
 
 /// A front is a run of blocks in the order of elimination. It updates only the pivots and the rows
 /// of its parent.
 struct FrontTree {
-  explicit FrontTree(const BlockMatrix& A);
+  explicit FrontTree(const BlockPattern& A);
 
   int num_fronts() const { return static_cast<int>(parent.size()); }
 

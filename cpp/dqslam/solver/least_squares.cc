@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -53,19 +54,16 @@ struct Pattern {
 };
 
 template <typename Pose>
-Pattern MakePattern(const PreparedGraph& prepared, const StageTerms& terms) {
-  PairCollector pairs(prepared.graph, terms.variables);
-  VisitTerms<Pose, EllipsoidModel>(prepared, terms, &pairs);
+Pattern MakePattern(const SolveContext& context, const StageTerms& terms) {
+  PairCollector pairs(context.graph(), terms.variables);
+  VisitTerms<Pose, EllipsoidModel>(context.prepared, terms, &pairs);
   std::vector<std::pair<int, int>> coupled;
+  const auto is_free = [](const auto& pair) { return pair.first >= 0 && pair.second >= 0; };
+  std::copy_if(pairs.all().begin(), pairs.all().end(), std::back_inserter(coupled), is_free);
+  BlockMatrix H(context.layouts->PatternOf(terms.variables.BlockSizes(), coupled));
   std::vector<int> off_diagonal;
-  for (const auto& [a, b] : pairs.all()) {
-    const bool is_constant = a < 0 || b < 0;
-    off_diagonal.push_back(is_constant ? -1 : static_cast<int>(coupled.size()));
-    if (!is_constant) coupled.emplace_back(a, b);
-  }
-  BlockMatrix H(terms.variables.BlockSizes(), coupled);
-  for (int& index : off_diagonal) {
-    if (index >= 0) index = H.index_of_pair(index);
+  for (const auto& pair : pairs.all()) {
+    off_diagonal.push_back(is_free(pair) ? H.IndexOf(pair.first, pair.second) : -1);
   }
   return {std::move(H), std::move(off_diagonal)};
 }
@@ -78,6 +76,7 @@ class StageProblem : public LeastSquares {
                StageTerms terms,
                std::vector<TermChunk> chunks,
                Pattern pattern,
+               std::shared_ptr<LayoutCache> layouts,
                int threads)
       : LeastSquares(std::move(pattern.H)),
         prepared_(prepared),
@@ -85,6 +84,7 @@ class StageProblem : public LeastSquares {
         terms_(std::move(terms)),
         chunks_(std::move(chunks)),
         off_diagonal_(std::move(pattern.off_diagonal)),
+        layouts_(std::move(layouts)),
         threads_(threads) {}
 
   VectorXd Pack(const State& state) const override { return terms_.variables.Pack(state); }
@@ -109,6 +109,9 @@ class StageProblem : public LeastSquares {
     equations_.H.SetZero(threads_);
     equations_.gradient.setZero(equations_.H.rows());
     return Add<true>(values, &equations_, &equations_.cost);
+  }
+  std::shared_ptr<const Elimination> LayOut() const override {
+    return layouts_->EliminationOf(equations_.H.pattern());
   }
 
  private:
@@ -166,6 +169,7 @@ class StageProblem : public LeastSquares {
   const StageTerms terms_;
   const std::vector<TermChunk> chunks_;
   const std::vector<int> off_diagonal_;
+  const std::shared_ptr<LayoutCache> layouts_;
   const int threads_;
 };
 
@@ -178,12 +182,13 @@ std::unique_ptr<LeastSquares> MakeLeastSquares(const SolveContext& context,
   return Dispatch(context.graph().pose_model, [&](auto pose) -> std::unique_ptr<LeastSquares> {
     using Pose = decltype(pose);
     std::vector<TermChunk> chunks = SplitTerms(context.graph(), &terms);
-    Pattern pattern = MakePattern<Pose>(context.prepared, terms);
+    Pattern pattern = MakePattern<Pose>(context, terms);
     return std::make_unique<StageProblem<Pose>>(context.prepared,
                                                 MakeLoss(stage.loss, context.options),
                                                 std::move(terms),
                                                 std::move(chunks),
                                                 std::move(pattern),
+                                                context.layouts,
                                                 context.options.threads);
   });
 }

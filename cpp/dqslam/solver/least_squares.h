@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <memory>
 
+#include "dqslam/linear/elimination.h"
 #include "dqslam/linear/normal_equations.h"
 #include "dqslam/solver/stage.h"
 
@@ -33,6 +34,10 @@ class LeastSquares {
   /// Computes equations().  Returns false where a residual is undefined.
   virtual bool Linearize(const Eigen::VectorXd& values) = 0;
   const NormalEquations& equations() const { return equations_; }
+  /// Lays out the factorization of equations().H.
+  virtual std::shared_ptr<const Elimination> LayOut() const {
+    return std::make_shared<Elimination>(*equations_.H.pattern());
+  }
 
  protected:
   explicit LeastSquares(BlockMatrix H) : equations_{0, Eigen::VectorXd(), std::move(H)} {}

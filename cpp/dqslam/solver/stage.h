@@ -1,8 +1,10 @@
 // One stage of estimation: it has some poses, some boxes, one residual and one minimizer.
 #pragma once
 
+#include <memory>
 #include <vector>
 
+#include "dqslam/linear/layout_cache.h"
 #include "dqslam/problem/options.h"
 #include "dqslam/problem/prepared.h"
 
@@ -13,11 +15,13 @@ inline bool IsAlgebraic(Residual residual) {
   return residual == Residual::kAlgebraic || residual == Residual::kAlgebraicNormalized;
 }
 
-/// What all stages of a solve share.  The members must outlive the context.
+/// What all stages of a solve share.  What it refers to must outlive the context.
 struct SolveContext {
   const PreparedGraph& prepared;
   const SolveOptions& options;
   const Monitor& monitor;
+  /// Stages that follow each other mostly have the same terms.
+  std::shared_ptr<LayoutCache> layouts = std::make_shared<LayoutCache>();
 
   const Graph& graph() const { return prepared.graph; }
 };

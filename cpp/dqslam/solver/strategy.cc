@@ -8,6 +8,12 @@ namespace {
 
 using Eigen::VectorXd;
 
+// The decrease of the cost that the model predicts for the step s of (H + D) s = -g, namely
+// -g^T s - s^T H s / 2.  The equation itself gives H s.
+double DecreaseOf(const NormalEquations& equations, const VectorXd& damping, const VectorXd& step) {
+  return 0.5 * step.dot(damping.cwiseProduct(step) - equations.gradient);
+}
+
 // The constants are those of Ceres, except for two.  In Ceres, the trust region grows at most
 // threefold in a step.  Ceres also damps the Gauss-Newton step of dog-leg by 1e-8 of the curvature,
 // which makes progress slow along the weakest modes of a long path: at 200 000 poses, their
@@ -22,9 +28,10 @@ class LevenbergMarquardt : public Strategy {
  public:
   using Strategy::Strategy;
 
-  bool Step(const NormalEquations& equations, bool is_new, VectorXd* step) override {
+  double Step(const NormalEquations& equations, bool is_new, VectorXd* step) override {
     if (is_new) curvature_ = Curvature(equations);
-    return Solve(equations, curvature_ / radius_, step);
+    const VectorXd damping = curvature_ / radius_;
+    return Solve(equations, damping, step) ? DecreaseOf(equations, damping, *step) : 0;
   }
   void Accept(double gain_ratio) override {
     const double growth = 1 - std::pow(2 * gain_ratio - 1, 3);
@@ -48,17 +55,18 @@ class Dogleg : public Strategy {
  public:
   using Strategy::Strategy;
 
-  bool Step(const NormalEquations& equations, bool is_new, VectorXd* step) override {
+  double Step(const NormalEquations& equations, bool is_new, VectorXd* step) override {
     if (is_new || stale_) {
       scale_ = Curvature(equations).cwiseSqrt();
       gradient_ = equations.gradient.cwiseQuotient(scale_);
       const VectorXd uphill = gradient_.cwiseQuotient(scale_);
       cauchy_ = gradient_.squaredNorm() / uphill.dot(equations.H.Multiply(uphill));
-      if (!FindGaussNewton(equations)) return false;
+      if (!FindGaussNewton(equations)) return 0;
       stale_ = false;
     }
     *step = Within().cwiseQuotient(scale_);
-    return true;
+    if (!IsLimited()) return DecreaseOf(equations, damping_ * scale_.cwiseAbs2(), *step);
+    return -step->dot(equations.gradient + 0.5 * equations.H.Multiply(*step));
   }
   void Accept(double gain_ratio) override {
     if (gain_ratio < kPoorGain) radius_ *= 0.5;
@@ -126,9 +134,13 @@ bool Strategy::StepWithoutLimit(const NormalEquations& equations, VectorXd* step
   return Solve(equations, kLeastDamping * Curvature(equations), step);
 }
 
-std::unique_ptr<Strategy> MakeStrategy(Minimizer minimizer, const BlockMatrix& H, int threads) {
-  if (minimizer == Minimizer::kDogleg) return std::make_unique<Dogleg>(H, kLargestRadius, threads);
-  return std::make_unique<LevenbergMarquardt>(H, kDampedRadius, threads);
+std::unique_ptr<Strategy> MakeStrategy(Minimizer minimizer,
+                                       std::shared_ptr<const Elimination> elimination,
+                                       int threads) {
+  if (minimizer == Minimizer::kDogleg) {
+    return std::make_unique<Dogleg>(std::move(elimination), kLargestRadius, threads);
+  }
+  return std::make_unique<LevenbergMarquardt>(std::move(elimination), kDampedRadius, threads);
 }
 
 }  // namespace dqslam

@@ -17,12 +17,12 @@ constexpr double kPoorGain = 0.25, kGoodGain = 0.75;
 /// The state of a trust region, with the factorization behind its steps.
 class Strategy {
  public:
-  Strategy(const BlockMatrix& H, double radius, int threads)
-      : radius_(radius), cholesky_(H, threads) {}
+  Strategy(std::shared_ptr<const Elimination> elimination, double radius, int threads)
+      : radius_(radius), cholesky_(std::move(elimination), threads) {}
   virtual ~Strategy() = default;
   /// Computes the step.  `is_new` is false if the equations are those of the last call.  Returns
-  /// false where there is no step.
-  virtual bool Step(const NormalEquations& equations, bool is_new, Eigen::VectorXd* step) = 0;
+  /// the decrease of the cost that the model predicts, which is 0 where there is no step.
+  virtual double Step(const NormalEquations& equations, bool is_new, Eigen::VectorXd* step) = 0;
   /// Computes the step that the model would take without a trust region.  Returns false where there
   /// is no such step.
   bool StepWithoutLimit(const NormalEquations& equations, Eigen::VectorXd* step);
@@ -49,7 +49,9 @@ class Strategy {
   Eigen::VectorXd first_scale_;
 };
 
-/// Makes a strategy for matrices with the pattern of `H`.
-std::unique_ptr<Strategy> MakeStrategy(Minimizer minimizer, const BlockMatrix& H, int threads);
+/// Makes a strategy for matrices with the pattern that was laid out.
+std::unique_ptr<Strategy> MakeStrategy(Minimizer minimizer,
+                                       std::shared_ptr<const Elimination> elimination,
+                                       int threads);
 
 }  // namespace dqslam

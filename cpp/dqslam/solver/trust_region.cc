@@ -116,7 +116,7 @@ Summary Minimize(const TrustRegionOptions& options,
   std::unique_ptr<Strategy> strategy;
   {
     const Stopwatch linear_solver(&summary.linear_solver_seconds);
-    strategy = MakeStrategy(options.minimizer, equations.H, options.threads);
+    strategy = MakeStrategy(options.minimizer, problem.LayOut(), options.threads);
   }
   // Stops because no step is short enough.  That is a minimum only if the model sees no decrease.
   const auto stop_short = [&](std::string message) {
@@ -149,9 +149,7 @@ Summary Minimize(const TrustRegionOptions& options,
     double predicted = 0;
     {
       const Stopwatch linear_solver(&summary.linear_solver_seconds);
-      if (strategy->Step(equations, is_new, &step)) {
-        predicted = -step.dot(equations.gradient + 0.5 * equations.H.Multiply(step));
-      }
+      predicted = strategy->Step(equations, is_new, &step);
     }
     is_new = false;
     if (!(predicted > 0)) {
