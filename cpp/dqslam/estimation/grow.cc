@@ -6,6 +6,7 @@
 
 #include "dqslam/estimation/realign.h"
 #include "dqslam/estimation/start_object.h"
+#include "dqslam/linear/parallel.h"
 
 namespace dqslam {
 namespace {
@@ -94,20 +95,31 @@ class Growth {
 
   void StartObjects(int end) {
     const bool last = end == graph_.num_poses();
+    std::vector<int> ready;
     for (int object = 0; object < graph_.num_objects(); ++object) {
-      if (started_[object]) continue;
-      const std::vector<int> seen = BoxesBefore(object, end);
-      if (!last && static_cast<int>(seen.size()) < context_.options.grow_min_views) continue;
-      state_.landmarks.row(object) = StartObject(context_, state_, object, seen);
-      started_[object] = true;
+      const bool is_seen = CountBefore(object, end) >= context_.options.grow_min_views;
+      if (!started_[object] && (last || is_seen)) ready.push_back(object);
     }
+    std::vector<Vector9d> starts(ready.size());
+    ParallelFor(context_.options.threads, static_cast<int>(ready.size()), [&](int i) {
+      starts[i] = StartObject(context_, state_, ready[i], BoxesBefore(ready[i], end));
+    });
+    for (size_t i = 0; i < ready.size(); ++i) {
+      state_.landmarks.row(ready[i]) = starts[i];
+      started_[ready[i]] = true;
+    }
+  }
+
+  int CountBefore(int object, int end) const {
+    const std::vector<int>& rows = context_.prepared.boxes_of_object[object];
+    const auto behind = std::partition_point(
+        rows.begin(), rows.end(), [&](int row) { return graph_.boxes.pose[row] < end; });
+    return static_cast<int>(behind - rows.begin());
   }
 
   std::vector<int> BoxesBefore(int object, int end) const {
     const std::vector<int>& rows = context_.prepared.boxes_of_object[object];
-    const auto behind = std::partition_point(
-        rows.begin(), rows.end(), [&](int row) { return graph_.boxes.pose[row] < end; });
-    return {rows.begin(), behind};
+    return {rows.begin(), rows.begin() + CountBefore(object, end)};
   }
 
   double Minimize(int first_free, int end) {
@@ -116,9 +128,10 @@ class Growth {
     stage.end_pose = end;
     for (int object = 0; object < graph_.num_objects(); ++object) {
       if (!started_[object]) continue;
-      const std::vector<int> seen = BoxesBefore(object, end);
-      if (seen.empty() || graph_.boxes.pose[seen.back()] < first_free) continue;
-      stage.boxes.insert(stage.boxes.end(), seen.begin(), seen.end());
+      const std::vector<int>& rows = context_.prepared.boxes_of_object[object];
+      const int count = CountBefore(object, end);
+      if (count == 0 || graph_.boxes.pose[rows[count - 1]] < first_free) continue;
+      stage.boxes.insert(stage.boxes.end(), rows.begin(), rows.begin() + count);
     }
     if (stage.boxes.empty()) return 0;
     stage.residual = context_.options.residual == Residual::kTangentThenBox
@@ -136,15 +149,15 @@ class Growth {
   // Whether many boxes of the new poses show known objects where they are not.
   bool Contradicts(int begin, int end) const {
     if (IsAlgebraic(context_.options.residual)) return false;
-    const Eigen::VectorXd costs = BoxCosts(context_, state_);
-    int boxes = 0, unexplained = 0;
+    std::vector<int> boxes;
     for (int row = 0; row < graph_.boxes.size(); ++row) {
       const int pose = graph_.boxes.pose[row];
-      if (pose < begin || pose >= end || !started_[graph_.boxes.object[row]]) continue;
-      ++boxes;
-      unexplained += 2 * costs[row] > kBoxChiSquare999;
+      if (pose >= begin && pose < end && started_[graph_.boxes.object[row]]) boxes.push_back(row);
     }
-    return boxes >= kFewestBoxes && unexplained > kMostUnexplained * boxes;
+    const auto count = static_cast<std::ptrdiff_t>(boxes.size());
+    if (count < kFewestBoxes) return false;
+    const Eigen::ArrayXd chi_squares = 2 * BoxCosts(context_, state_, boxes);
+    return (chi_squares > kBoxChiSquare999).count() > kMostUnexplained * count;
   }
 
   // Moves the poses since which the boxes contradict the map to where the known objects are, if

@@ -16,11 +16,16 @@ Eigen::Matrix<double, kSize, kSize> RowToSquare(const RowMatrix& table, int row)
       table.row(row).data());
 }
 
+// Most rows are the same as the one before.
 template <int kSize, typename Square>
 std::vector<Square> SqrtInformationOfRows(const RowMatrix& covariance) {
   std::vector<Square> result;
   result.reserve(covariance.rows());
   for (int row = 0; row < covariance.rows(); ++row) {
+    if (row > 0 && covariance.row(row) == covariance.row(row - 1)) {
+      result.push_back(result.back());
+      continue;
+    }
     result.push_back(SqrtInformation<kSize>(RowToSquare<kSize>(covariance, row)));
   }
   return result;

@@ -2,6 +2,8 @@
 
 #include <ceres/problem.h>
 
+#include <numeric>
+
 #include "dqslam/costs/box_chi_square.h"
 #include "dqslam/linear/parallel.h"
 #include "dqslam/solver/ceres_backend.h"
@@ -38,18 +40,27 @@ Summary Optimize(const SolveContext& context, const Stage& stage, State* state) 
 }
 
 Eigen::VectorXd BoxCosts(const SolveContext& context, const State& state) {
+  std::vector<int> rows(context.graph().boxes.size());
+  std::iota(rows.begin(), rows.end(), 0);
+  return BoxCosts(context, state, rows);
+}
+
+Eigen::VectorXd BoxCosts(const SolveContext& context,
+                         const State& state,
+                         const std::vector<int>& rows) {
   const Graph& graph = context.graph();
-  Eigen::VectorXd costs(graph.boxes.size());
+  Eigen::VectorXd costs(rows.size());
   const auto evaluate = [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
-    for (auto row = static_cast<int>(begin); row < end; ++row) {
+    for (std::ptrdiff_t i = begin; i < end; ++i) {
+      const int row = rows[i];
       const CameraInWorld<double> camera =
           LocateCamera(context.prepared, state, graph.boxes.pose[row]);
       VisitObject(context.options, state, graph.boxes.object[row], [&](const auto& in_world) {
-        costs[row] = 0.5 * BoxChiSquare(ToCamera(camera, in_world),
-                                        graph.camera,
-                                        graph.boxes.box.row(row),
-                                        graph.boxes.truncated.row(row),
-                                        context.prepared.box_sqrt_information[row]);
+        costs[i] = 0.5 * BoxChiSquare(ToCamera(camera, in_world),
+                                      graph.camera,
+                                      graph.boxes.box.row(row),
+                                      graph.boxes.truncated.row(row),
+                                      context.prepared.box_sqrt_information[row]);
       });
     }
   };

@@ -49,5 +49,9 @@ Summary Optimize(const SolveContext& context, const Stage& stage, State* state);
 /// Half the squared Mahalanobis distance of each box from its prediction.  It is infinite where the
 /// object is not strictly in front of the camera.
 Eigen::VectorXd BoxCosts(const SolveContext& context, const State& state);
+/// The same of some boxes, in the order of their rows.
+Eigen::VectorXd BoxCosts(const SolveContext& context,
+                         const State& state,
+                         const std::vector<int>& rows);
 
 }  // namespace dqslam
