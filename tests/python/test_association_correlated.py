@@ -82,9 +82,7 @@ def test_an_object_that_its_boxes_leave_open_does_not_keep_the_others(made):
     )
     start = 6 * (problem.graph.num_poses - 1)
     sigma = np.sqrt(np.diag(np.linalg.inv(found.hessian)))[start:].reshape(-1, 9)
-    cameras = _core.world_from_camera(
-        _core.PoseModel.SE3, problem.graph.camera, found.state.poses
-    )
+    cameras = _core.world_from_camera(_core.PoseModel.SE3, problem.graph.camera, found.state.poses)
     away = np.linalg.norm(found.state.landmarks[0, :3] - cameras[table.pose[own], :3], axis=1)
     np.testing.assert_allclose(sigma[0, :3], np.median(away), rtol=1e-2)
     np.testing.assert_allclose(found.state.landmarks[0, :3], state.landmarks[0, :3], atol=1e-9)

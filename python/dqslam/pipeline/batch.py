@@ -37,9 +37,9 @@ from dqslam.uncertainty import (
 # Boxes are undistorted again for the map until they move by less than this [px], or so many times.
 _LENS_PX = 0.02
 _LENS_ROUNDS = 4
-# With fewer images to a keyframe, the others have little to add to what the keyframes tell. Where the
-# association had no final ids, it believed a noise of boxes that has a lower limit, and that may be
-# far too high; then fewer are worth their time.
+# With fewer images to a keyframe, the others have little to add to what the keyframes tell. Without
+# final ids, the association believed a noise of boxes that has a lower limit and may be far too
+# high: then fewer are worth their time.
 FEWEST_IMAGES_A_KEYFRAME, FEWEST_WITHOUT_IDS = 3.0, 1.25
 
 
