@@ -1,4 +1,4 @@
-"""Problems of the core with other tables, or with a part of the objects."""
+"""Problems of the core with other tables, or with a part of the objects or poses."""
 
 from typing import Any
 
@@ -6,6 +6,9 @@ import numpy as np
 
 from dqslam import _core
 from dqslam._checks import Bools, Ints
+from dqslam.layout import flat
+from dqslam.recording import Odometry
+from dqslam.recording.odometry import compose_covariance
 
 
 def rebuilt(core: _core.Graph, **changes: Any) -> _core.Graph:
@@ -53,6 +56,55 @@ def select_objects(core: _core.Graph, rows: Ints) -> _core.Graph:
         placements=_placements_of(core.placements, place),
         measurements=[_of_kept(table, place) for table in core.measurements],
         shapes=[core.shapes[row] for row in rows.tolist()] if core.shapes else [],
+    )
+
+
+def select_poses(core: _core.Graph, rows: Ints) -> _core.Graph:
+    """Return a problem with some poses only, ascending (f,), and odometry composed between them.
+
+    To first order in the noise, it costs as much as the whole problem does with the others at their
+    best. Boxes and measurements must be at poses that stay. With loop closures, all of them do.
+    """
+    steps, chain = core.odometry, np.arange(core.num_poses - 1)
+    if not (np.array_equal(steps.from_pose, chain) and np.array_equal(steps.to_pose, chain + 1)):
+        return core
+    k = int(np.sqrt(steps.covariance.shape[1]))
+    odometry = Odometry(
+        core.pose_model,
+        core.initial_poses[0],
+        steps.relative,
+        steps.covariance.reshape(-1, k, k),
+    )
+    path = _core.dead_reckon(core.pose_model, odometry.first_pose, odometry.relative)[rows]
+    place = np.full(core.num_poses, -1)
+    place[rows] = np.arange(len(rows))
+    boxes, ends = core.boxes, np.arange(len(rows) - 1)
+    return rebuilt(
+        core,
+        initial_poses=core.initial_poses[rows],
+        odometry=_core.OdometryTable(
+            from_pose=ends,
+            to_pose=ends + 1,
+            relative=_core.between(core.pose_model, path[:-1], path[1:]),
+            covariance=flat(compose_covariance(odometry, odometry.covariance, rows)),
+        ),
+        boxes=_core.BoxTable(
+            pose=place[boxes.pose],
+            object=boxes.object,
+            box=boxes.box,
+            covariance=boxes.covariance,
+            truncated=boxes.truncated,
+        ),
+        measurements=[
+            _core.MeasurementTable(
+                kind=table.kind,
+                pose=place[table.pose],
+                object=table.object,
+                value=table.value,
+                covariance=table.covariance,
+            )
+            for table in core.measurements
+        ],
     )
 
 

@@ -220,7 +220,7 @@ TYPED_TEST(LeastSquaresOf, InformationIsThatOfCeres) {
       const Reference expected(PreparedGraph(graph, false), options, this->AllOf(residual), state);
       const Information found = ComputeInformation(graph, options, state);
       EXPECT_NEAR(0.5 * found.residuals.squaredNorm(), expected.cost, 1e-10 * expected.cost);
-      const Eigen::MatrixXd H(found.matrix);
+      const Eigen::MatrixXd H = Dense(found.H);
       ASSERT_EQ(H.rows(), expected.H.rows());
       EXPECT_LT((H - expected.H).cwiseAbs().maxCoeff(), 1e-9 * expected.H.cwiseAbs().maxCoeff());
     }

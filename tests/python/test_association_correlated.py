@@ -14,6 +14,7 @@ from dqslam.association.repetition import RepeatedNoise
 from dqslam.association.variances import Levels, estimate_with_levels
 from dqslam.assumptions import BoxNoise, OdometryNoise, SizePrior
 from dqslam.graph import build_graph
+from dqslam.subgraph import rebuilt
 from repeated_errors import with_repeated_errors
 from scenes import film, map_truly, orbit_poses, table_things
 
@@ -56,6 +57,37 @@ def test_the_gradient_and_the_hessian_are_those_of_the_cost(made):
         back = problem.cost(problem.retract(state, -step), here)
         assert ahead - back == pytest.approx(2.0 * step @ here.gradient, rel=1e-3, abs=1e-6)
         assert ahead + back - 2.0 * here.cost == pytest.approx(1e-6, rel=0.02)
+
+
+def test_an_object_that_its_boxes_leave_open_does_not_keep_the_others(made):
+    """All edges of its boxes may be hidden, and the object extends beyond: they say nothing."""
+    problem, state = lay_out(made)
+    table = problem.graph.boxes
+    own = table.object == 0
+    box, truncated = table.box.copy(), table.truncated.copy()
+    box[own] += 0.25 * (box[own, 2:] - box[own, :2])[:, [0, 1, 0, 1]] * [1.0, 1.0, -1.0, -1.0]
+    truncated[own] = True
+    boxes = _core.BoxTable(
+        pose=table.pose,
+        object=table.object,
+        box=box,
+        covariance=table.covariance,
+        truncated=truncated,
+    )
+    found = minimize(
+        CorrelatedProblem(rebuilt(problem.graph, boxes=boxes)),
+        state,
+        RepeatedNoise(),
+        max_iterations=20,
+    )
+    start = 6 * (problem.graph.num_poses - 1)
+    sigma = np.sqrt(np.diag(np.linalg.inv(found.hessian)))[start:].reshape(-1, 9)
+    cameras = _core.world_from_camera(_core.PoseModel.SE3, problem.graph.camera, found.state.poses)
+    away = np.linalg.norm(found.state.landmarks[0, :3] - cameras[table.pose[own], :3], axis=1)
+    np.testing.assert_allclose(sigma[0, :3], np.median(away), rtol=1e-2)
+    np.testing.assert_allclose(found.state.landmarks[0, :3], state.landmarks[0, :3], atol=1e-9)
+    assert sigma[1:, :3].max() < 0.02 * np.median(away)
+    assert made.ate(found.state.poses) < 0.5 * made.ate(made.odometry)
 
 
 def test_levels_of_boxes_are_recovered(made):

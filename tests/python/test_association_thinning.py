@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from dqslam import Detections, Odometry, PoseModel, Recording, _core
-from dqslam.association.thinning import compose_covariance, fill_in, thin_recording
+from dqslam.association.thinning import fill_in, thin_recording
+from dqslam.recording.odometry import compose_covariance
 from scenes import CAMERA
 
 MODELS = [PoseModel.SE2, PoseModel.SE3]
@@ -63,9 +64,8 @@ def test_composed_covariance_is_that_of_simulated_noise(model):
     random = np.random.default_rng(2)
     root = 0.01 * random.normal(size=(6, k, k))
     covariance = root @ root.transpose(0, 2, 1) + 1e-6 * np.eye(k)
-    composed = compose_covariance(
-        path(model, relative, covariance), covariance, np.array([0, 4, 6])
-    )
+    odometry = path(model, relative, covariance).odometry
+    composed = compose_covariance(odometry, covariance, np.array([0, 4, 6]))
     for first, last, expected in ((0, 4, composed[0]), (4, 6, composed[1])):
         noisy = exact = None
         for step in range(first, last):

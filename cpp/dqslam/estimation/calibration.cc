@@ -1,6 +1,5 @@
 #include "dqslam/estimation/calibration.h"
 
-#include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <stdexcept>
 
@@ -216,13 +215,12 @@ CalibrationScore ScoreCalibration(const Graph& graph,
         (2 * parameters[i].step);
   }
 
-  const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor(Damped(information.matrix));
-  if (factor.info() != Eigen::Success) {
-    throw std::runtime_error("the information matrix is not positive definite");
-  }
+  const BlockCholesky factor = Factorize(information.H);
   const auto& J = information.jacobian;
-  const Eigen::MatrixXd projected =
-      by_parameter - J * factor.solve(Eigen::MatrixXd(J.transpose() * by_parameter));
+  Eigen::MatrixXd projected = by_parameter;
+  for (int i = 0; i < kNumParameters; ++i) {
+    projected.col(i) -= J * factor.Solve(J.transpose() * by_parameter.col(i));
+  }
   const int boxes = kBoxSize * information.num_boxes;
   const int odometry = static_cast<int>(terms.odometry.size()) * graph.tangent_size();
   CalibrationScore result;

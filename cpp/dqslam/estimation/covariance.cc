@@ -1,8 +1,9 @@
 #include "dqslam/estimation/covariance.h"
 
-#include <Eigen/SparseCholesky>
 #include <cmath>
 #include <stdexcept>
+#include <string>
+#include <utility>
 
 #include "dqslam/estimation/information.h"
 #include "dqslam/linear/selected_inverse.h"
@@ -16,16 +17,56 @@ constexpr double kUndetermined = 1e9;
 
 using RowMajorSparse = Eigen::SparseMatrix<double, Eigen::RowMajor>;
 
-// The leverage of a residual: its diagonal entry of J H^-1 J^T.
-double Leverage(const RowMajorSparse& J, int row, const SelectedInverse& inverse) {
-  double leverage = 0;
-  for (RowMajorSparse::InnerIterator a(J, row); a; ++a) {
-    for (RowMajorSparse::InnerIterator b(J, row); b; ++b) {
-      leverage += a.value() * inverse(a.col(), b.col()) * b.value();
+// The leverages of residuals: diagonal entries of J H^-1 J^T.
+class Leverages {
+ public:
+  explicit Leverages(const Information& information)
+      : information_(information),
+        factor_(Factorize(information.H)),
+        inverse_(information.H, factor_) {
+    for (int block = 0; block < information.H.num_blocks(); ++block) {
+      block_of_column_.insert(block_of_column_.end(), information.H.size(block), block);
     }
   }
-  return leverage;
-}
+
+  double At(int row) {
+    const RowMajorSparse& J = information_.jacobian;
+    const int begin = J.outerIndexPtr()[row];
+    const int columns = J.outerIndexPtr()[row + 1] - begin;
+    FindBlocks(J.innerIndexPtr() + begin, columns);
+    const Eigen::Map<const Eigen::VectorXd> j(J.valuePtr() + begin, columns);
+    return j.dot(covariance_ * j);
+  }
+
+ private:
+  // Looks up the inverse at the columns of a row, unless the row before had the same.
+  void FindBlocks(const int* column, int columns) {
+    std::vector<int> blocks;
+    for (int c = 0; c < columns; c += information_.H.size(blocks.back())) {
+      blocks.push_back(block_of_column_[column[c]]);
+    }
+    if (blocks == blocks_) return;
+    covariance_.resize(columns, columns);
+    int r = 0;
+    for (const int a : blocks) {
+      int c = 0;
+      for (const int b : blocks) {
+        const Eigen::MatrixXd block = inverse_.Block(a, b);
+        covariance_.block(r, c, block.rows(), block.cols()) = block;
+        c += static_cast<int>(block.cols());
+      }
+      r += information_.H.size(a);
+    }
+    blocks_ = std::move(blocks);
+  }
+
+  const Information& information_;
+  const BlockCholesky factor_;
+  const SelectedInverse inverse_;
+  std::vector<int> block_of_column_;
+  std::vector<int> blocks_;     // of the last row
+  Eigen::MatrixXd covariance_;  // of these
+};
 
 // Columns of some poses and objects in the information matrix; -1 for those of a fixed pose.
 std::vector<int> ColumnsOf(const Information& information,
@@ -33,21 +74,25 @@ std::vector<int> ColumnsOf(const Information& information,
                            const std::vector<int>& poses,
                            const std::vector<int>& objects) {
   std::vector<int> columns;
-  const auto add = [&columns](int start, int size) {
-    for (int i = 0; i < size; ++i) columns.push_back(start < 0 ? -1 : start + i);
+  const auto add = [&](int block) {
+    const int start = information.H.offset(block);
+    for (int i = 0; i < information.H.size(block); ++i) columns.push_back(start + i);
   };
   for (const int pose : poses) {
     if (pose < 0 || pose >= graph.num_poses()) {
       throw std::invalid_argument("poses: " + std::to_string(pose) + " is no pose");
     }
-    const bool fixed = pose < information.first_free_pose;
-    add(fixed ? -1 : information.PoseColumn(pose), graph.tangent_size());
+    if (pose < information.first_free_pose) {
+      columns.insert(columns.end(), graph.tangent_size(), -1);
+    } else {
+      add(information.PoseBlock(pose));
+    }
   }
   for (const int object : objects) {
     if (object < 0 || object >= graph.num_objects()) {
       throw std::invalid_argument("objects: " + std::to_string(object) + " is no object");
     }
-    add(information.ObjectColumn(object), kLandmarkSize);
+    add(information.ObjectBlock(object));
   }
   return columns;
 }
@@ -56,33 +101,33 @@ std::vector<int> ColumnsOf(const Information& information,
 
 Covariance ComputeCovariance(const Graph& graph, const SolveOptions& options, const State& state) {
   const Information information = ComputeInformation(graph, options, state);
-  const SelectedInverse inverse(Damped(information.matrix));
+  const BlockMatrix& H = information.H;
+  const BlockCholesky factor = Factorize(H);
+  const SelectedInverse inverse(H, factor);
 
   const int k = graph.tangent_size();
   Covariance covariance;
   covariance.poses = RowMatrix::Zero(graph.num_poses(), k * k);
   covariance.objects = RowMatrix::Zero(graph.num_objects(), kLandmarkSize * kLandmarkSize);
-  int offset = 0;
   covariance.shared.resize(graph.num_shared());
+  const Eigen::VectorXd precision = H.diagonal();
   const int blocks = information.num_free_poses + graph.num_objects();
   for (int b = 0; b < blocks; ++b) {
-    const int size = information.block_sizes[b];
     const bool is_pose = b < information.num_free_poses;
     const int of_table = is_pose ? information.first_free_pose + b : b - information.num_free_poses;
     auto row = is_pose ? covariance.poses.row(of_table) : covariance.objects.row(of_table);
-    const Eigen::MatrixXd block = inverse.Block(offset, size);
+    const Eigen::MatrixXd block = inverse.Block(b, b);
     row = block.reshaped().transpose();
-    for (int i = 0; i < size; ++i) {
-      if (block(i, i) * information.matrix.coeff(offset + i, offset + i) < kUndetermined) continue;
+    for (int i = 0; i < H.size(b); ++i) {
+      if (block(i, i) * precision[H.offset(b) + i] < kUndetermined) continue;
       covariance.under_constrained.push_back(
           {is_pose ? VariableKind::kPose : VariableKind::kObject, of_table, i});
       row.setConstant(std::nan(""));
       break;
     }
-    offset += size;
   }
-  for (int row = 0; row < graph.num_shared(); ++row, ++offset) {
-    covariance.shared[row] = inverse(offset, offset);
+  for (int row = 0; row < graph.num_shared(); ++row) {
+    covariance.shared[row] = inverse.Block(blocks + row, blocks + row)(0, 0);
   }
   return covariance;
 }
@@ -94,29 +139,26 @@ RowMatrix ComputeJointCovariance(const Graph& graph,
                                  const std::vector<int>& objects) {
   const Information information = ComputeInformation(graph, options, state);
   const std::vector<int> columns = ColumnsOf(information, graph, poses, objects);
-  const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor(Damped(information.matrix));
-  if (factor.info() != Eigen::Success) {
-    throw std::runtime_error("the information matrix is not positive definite");
+  std::vector<int> known;  // of the columns
+  for (const int column : columns) {
+    if (column >= 0) known.push_back(column);
   }
+  const Eigen::MatrixXd inverse = InverseAt(Factorize(information.H), known);
   const int size = static_cast<int>(columns.size());
   RowMatrix joint = RowMatrix::Zero(size, size);
-  Eigen::VectorXd unit = Eigen::VectorXd::Zero(information.matrix.rows());
-  for (int c = 0; c < size; ++c) {
-    if (columns[c] < 0) continue;
-    unit[columns[c]] = 1;
-    const Eigen::VectorXd column = factor.solve(unit);
-    unit[columns[c]] = 0;
-    for (int r = 0; r < size; ++r) {
-      if (columns[r] >= 0) joint(r, c) = column[columns[r]];
+  for (int r = 0, at_r = 0; r < size; ++r) {
+    if (columns[r] < 0) continue;
+    for (int c = 0, at_c = 0; c < size; ++c) {
+      if (columns[c] >= 0) joint(r, c) = inverse(at_r, at_c++);
     }
+    ++at_r;
   }
   return joint;
 }
 
 Fit ComputeFit(const Graph& graph, const SolveOptions& options, const State& state) {
   const Information information = ComputeInformation(graph, options, state);
-  const SelectedInverse inverse(Damped(information.matrix));
-  const RowMajorSparse J = information.jacobian;
+  Leverages leverages(information);
 
   const int k = graph.tangent_size();
   Fit fit;
@@ -128,11 +170,11 @@ Fit ComputeFit(const Graph& graph, const SolveOptions& options, const State& sta
     if (later < information.first_free_pose) continue;
     for (int i = 0; i < k; ++i, ++row) {
       fit.odometry_residuals(edge, i) = information.residuals[row];
-      fit.odometry_leverage(edge, i) = Leverage(J, row, inverse);
+      fit.odometry_leverage(edge, i) = leverages.At(row);
     }
   }
   for (const int end = row + 4 * information.num_boxes; row < end; ++row) {
-    const double leverage = Leverage(J, row, inverse);
+    const double leverage = leverages.At(row);
     if (leverage == 0) continue;  // The border cut this edge, and the object extends to it.
     fit.box_squares += information.residuals[row] * information.residuals[row];
     fit.box_redundancy += 1 - leverage;

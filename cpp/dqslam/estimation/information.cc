@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <array>
-#include <numeric>
 #include <stdexcept>
+#include <utility>
+#include <vector>
 
 #include "dqslam/estimation/graduated.h"
 #include "dqslam/estimation/repair.h"
@@ -14,7 +15,8 @@
 namespace dqslam {
 namespace {
 
-using Sparse = Eigen::SparseMatrix<double>;
+using RowMajorSparse = Eigen::SparseMatrix<double, Eigen::RowMajor>;
+using RowMajorBlock = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 // The damping, relative to the diagonal of H.  It is far below the information of the data.
 constexpr double kDamping = 1e-12;
@@ -67,13 +69,12 @@ class JacobianRows {
     const int rows = static_cast<int>(residuals_.size());
     information->residuals = Eigen::Map<const Eigen::VectorXd>(residuals_.data(), rows);
     starts_.push_back(static_cast<int>(columns_.size()));
-    information->jacobian =
-        Eigen::Map<const Eigen::SparseMatrix<double, Eigen::RowMajor>>(rows,
-                                                                       variables_.num_tangents(),
-                                                                       starts_.back(),
-                                                                       starts_.data(),
-                                                                       columns_.data(),
-                                                                       values_.data());
+    information->jacobian = Eigen::Map<const RowMajorSparse>(rows,
+                                                             variables_.num_tangents(),
+                                                             starts_.back(),
+                                                             starts_.data(),
+                                                             columns_.data(),
+                                                             values_.data());
   }
 
  private:
@@ -140,16 +141,68 @@ class JacobianRows {
   std::vector<int> starts_, columns_;
 };
 
+// Rows of the Jacobian that follow each other and have the same columns, which are whole blocks.
+struct RowGroup {
+  int begin, end;
+  std::vector<int> blocks;
+};
+
+std::vector<RowGroup> GroupRows(const RowMajorSparse& J, const std::vector<int>& block_sizes) {
+  std::vector<int> block_of_column;
+  for (size_t block = 0; block < block_sizes.size(); ++block) {
+    block_of_column.insert(block_of_column.end(), block_sizes[block], static_cast<int>(block));
+  }
+  std::vector<RowGroup> groups;
+  for (int row = 0; row < J.rows(); ++row) {
+    std::vector<int> blocks;
+    for (int p = J.outerIndexPtr()[row]; p < J.outerIndexPtr()[row + 1];) {
+      blocks.push_back(block_of_column[J.innerIndexPtr()[p]]);
+      p += block_sizes[blocks.back()];
+    }
+    if (groups.empty() || groups.back().blocks != blocks) {
+      groups.push_back({row, row, std::move(blocks)});
+    }
+    groups.back().end = row + 1;
+  }
+  return groups;
+}
+
+// J^T J, group by group.
+BlockMatrix NormalMatrix(const RowMajorSparse& J, const std::vector<int>& block_sizes) {
+  const std::vector<RowGroup> groups = GroupRows(J, block_sizes);
+  std::vector<std::pair<int, int>> coupled;
+  for (const RowGroup& group : groups) {
+    for (size_t b = 1; b < group.blocks.size(); ++b) {
+      for (size_t a = 0; a < b; ++a) coupled.emplace_back(group.blocks[a], group.blocks[b]);
+    }
+  }
+  BlockMatrix H(block_sizes, coupled);
+  size_t pair = 0;
+  for (const RowGroup& group : groups) {
+    const int first = J.outerIndexPtr()[group.begin];
+    const int columns = J.outerIndexPtr()[group.begin + 1] - first;
+    const Eigen::Map<const RowMajorBlock> rows(
+        J.valuePtr() + first, group.end - group.begin, columns);
+    const auto add = [&](double* block, int at_a, int size_a, int at_b, int size_b) {
+      Eigen::Map<Eigen::MatrixXd>(block, size_a, size_b).noalias() +=
+          rows.middleCols(at_a, size_a).transpose().lazyProduct(rows.middleCols(at_b, size_b));
+    };
+    int at_b = 0;
+    for (const int b : group.blocks) {
+      add(H.Diagonal(b), at_b, H.size(b), at_b, H.size(b));
+      int at_a = 0;
+      for (size_t k = 0; group.blocks[k] != b; ++k) {
+        const int a = group.blocks[k];
+        add(H.OffDiagonal(H.index_of_pair(pair++)), at_a, H.size(a), at_b, H.size(b));
+        at_a += H.size(a);
+      }
+      at_b += H.size(b);
+    }
+  }
+  return H;
+}
+
 }  // namespace
-
-int Information::PoseColumn(int pose) const {
-  return block_sizes.empty() ? 0 : (pose - first_free_pose) * block_sizes.front();
-}
-
-int Information::ObjectColumn(int object) const {
-  const auto begin = block_sizes.begin();
-  return std::accumulate(begin, begin + num_free_poses, 0) + object * kLandmarkSize;
-}
 
 StageTerms InformationTerms(const Graph& graph, const SolveOptions& options, const State& state) {
   const PreparedGraph prepared(graph, options.mode == Mode::kMapping);
@@ -171,7 +224,6 @@ Information ComputeInformation(const Graph& graph,
   information.first_free_pose = terms.variables.first_free_pose;
   information.num_free_poses = terms.variables.num_free_poses();
   information.num_boxes = static_cast<int>(terms.boxes.size());
-  information.block_sizes = terms.variables.BlockSizes();
   const bool defined =
       Dispatch(graph.pose_model, options.landmark_model, [&](auto pose, auto landmark) {
         JacobianRows<decltype(pose), decltype(landmark)> rows(context, terms.variables, state);
@@ -180,18 +232,16 @@ Information ComputeInformation(const Graph& graph,
         return true;
       });
   if (!defined) throw std::runtime_error("covariance: a residual is undefined at this state");
-  information.matrix = Sparse(information.jacobian.transpose()) * information.jacobian;
+  information.H = NormalMatrix(information.jacobian, terms.variables.BlockSizes());
   return information;
 }
 
-// Every entry of a block of J^T J must be stored, also where it is zero.
-Sparse Damped(const Sparse& H) {
-  Sparse damping(H.rows(), H.cols());
-  damping.setIdentity();
-  for (int i = 0; i < H.rows(); ++i) {
-    damping.coeffRef(i, i) = std::max(kDamping * H.coeff(i, i), 1e-300);
+BlockCholesky Factorize(const BlockMatrix& H) {
+  BlockCholesky cholesky(H);
+  if (!cholesky.Factorize(H, (kDamping * H.diagonal()).cwiseMax(1e-300))) {
+    throw std::runtime_error("the information matrix is not positive definite");
   }
-  return H + damping;
+  return cholesky;
 }
 
 }  // namespace dqslam

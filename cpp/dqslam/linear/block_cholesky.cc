@@ -9,22 +9,8 @@
 #include "dqslam/linear/parallel.h"
 
 namespace dqslam {
-namespace {
 
-using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-// The columns of L of one front: at its pivots and at the rows below them.
-auto PivotsOf(const double* factor, const Front& front) {
-  return Eigen::Map<const MatrixXd, 0, Eigen::OuterStride<>>(
-      factor, front.pivots, front.pivots, Eigen::OuterStride<>(front.rows()));
-}
-auto BelowOf(const double* factor, const Front& front) {
-  return Eigen::Map<const MatrixXd, 0, Eigen::OuterStride<>>(
-      factor + front.pivots, front.below, front.pivots, Eigen::OuterStride<>(front.rows()));
-}
-
-}  // namespace
 
 BlockCholesky::BlockCholesky(std::shared_ptr<const Elimination> elimination, int threads)
     : elimination_(std::move(elimination)),
@@ -136,6 +122,31 @@ void BlockCholesky::AddUpdates(int f) {
   }
 }
 
+BlockCholesky::Columns BlockCholesky::Pivots(int f) const {
+  const Front& front = elimination_->fronts[f];
+  return {factor_.data() + front.factor,
+          front.pivots,
+          front.pivots,
+          Eigen::OuterStride<>(front.rows())};
+}
+
+BlockCholesky::Columns BlockCholesky::Below(int f) const {
+  const Front& front = elimination_->fronts[f];
+  return {factor_.data() + front.factor + front.pivots,
+          front.below,
+          front.pivots,
+          Eigen::OuterStride<>(front.rows())};
+}
+
+int BlockCholesky::FrontOf(int row) const {
+  const auto after =
+      std::upper_bound(elimination_->fronts.begin(),
+                       elimination_->fronts.end() - 1,
+                       row,
+                       [](int wanted, const Front& front) { return wanted < front.pivot; });
+  return static_cast<int>(after - elimination_->fronts.begin()) - 1;
+}
+
 VectorXd BlockCholesky::Solve(const VectorXd& b) const {
   const Elimination& e = *elimination_;
   const int subtrees = static_cast<int>(e.subtrees.size());
@@ -147,22 +158,20 @@ VectorXd BlockCholesky::Solve(const VectorXd& b) const {
   // L y = b, where subtract(r, v) subtracts v from a row below the pivots.
   const auto forward = [&](int f, VectorXd& workspace, const auto& subtract) {
     const Front& front = e.fronts[f];
-    const double* factor = factor_.data() + front.factor;
     auto y = x.segment(front.pivot, front.pivots);
     auto below = workspace.head(front.below);
-    PivotsOf(factor, front).triangularView<Eigen::Lower>().solveInPlace(y);
-    below.noalias() = BelowOf(factor, front) * y;
+    Pivots(f).triangularView<Eigen::Lower>().solveInPlace(y);
+    below.noalias() = Below(f) * y;
     for (int r = 0; r < front.below; ++r) subtract(e.rows[front.row + r], below[r]);
   };
   // L^T x = y.
   const auto backward = [&](int f, VectorXd& workspace) {
     const Front& front = e.fronts[f];
-    const double* factor = factor_.data() + front.factor;
     auto y = x.segment(front.pivot, front.pivots);
     auto below = workspace.head(front.below);
     for (int r = 0; r < front.below; ++r) below[r] = x[e.rows[front.row + r]];
-    y.noalias() -= BelowOf(factor, front).transpose() * below;
-    PivotsOf(factor, front).transpose().triangularView<Eigen::Upper>().solveInPlace(y);
+    y.noalias() -= Below(f).transpose() * below;
+    Pivots(f).transpose().triangularView<Eigen::Upper>().solveInPlace(y);
   };
 
   // What subtrees subtract from rows outside of them, which are the rows below their last fronts.

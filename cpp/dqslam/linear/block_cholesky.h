@@ -29,6 +29,15 @@ class BlockCholesky {
   /// (A + diag(damping))^-1 b. The last call of Factorize must have returned true.
   Eigen::VectorXd Solve(const Eigen::VectorXd& b) const;
 
+  /// What the factor consists of, for those who need more of it than solutions.
+  using Columns = Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
+  const Elimination& elimination() const { return *elimination_; }
+  /// L of one front, at its pivots (undefined above the diagonal) and at the rows below them.
+  Columns Pivots(int f) const;
+  Columns Below(int f) const;
+  /// The front that has a row, in the order of elimination, among its pivots.
+  int FrontOf(int row) const;
+
  private:
   bool Eliminate(const BlockMatrix& A, const Eigen::VectorXd& placed_damping, int f);
   void PlaceBlocks(const BlockMatrix& A, int f);

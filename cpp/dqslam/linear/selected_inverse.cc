@@ -1,74 +1,138 @@
 #include "dqslam/linear/selected_inverse.h"
 
-#include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <stdexcept>
+#include <string>
 
 namespace dqslam {
 namespace {
 
-using Sparse = Eigen::SparseMatrix<double>;
+using Eigen::Lower;
+using Eigen::MatrixXd;
 
-// Entries of (L D L^T)^-1 on the pattern of L, stored like L with its unit diagonal:
-//   Z_ij = [i = j] / d_j - sum_{k > j, L_kj != 0} Z_ik L_kj   for i >= j, last column first.
-Sparse InverseOnPattern(const Sparse& L, const Eigen::VectorXd& D) {
-  Sparse Z = L;
-  const int* outer = L.outerIndexPtr();
-  const int* inner = L.innerIndexPtr();
-  const double* value = L.valuePtr();
-  Eigen::VectorXd column = Eigen::VectorXd::Zero(L.rows());
-  for (int j = static_cast<int>(L.cols()) - 1; j >= 0; --j) {
-    const int begin = outer[j], end = outer[j + 1];  // the first entry is the diagonal
-    for (int p = begin; p < end; ++p) column[inner[p]] = 0;
-    // Z restricted to the rows of this column is symmetric: visit each stored entry once.
-    for (int p = begin + 1; p < end; ++p) {
-      const int k = inner[p];
-      int r = begin + 1;
-      for (int s = outer[k]; s < outer[k + 1]; ++s) {
-        const int i = inner[s];
-        while (r < end && inner[r] < i) ++r;
-        if (r == end) break;
-        if (inner[r] != i) continue;
-        const double z = Z.valuePtr()[s];
-        column[i] -= z * value[p];
-        if (i != k) column[k] -= z * value[r];
-      }
-    }
-    double diagonal = 1 / D[j];
-    for (int p = begin + 1; p < end; ++p) {
-      Z.valuePtr()[p] = column[inner[p]];
-      diagonal -= value[p] * column[inner[p]];
-    }
-    Z.valuePtr()[begin] = diagonal;
-  }
-  return Z;
+using RowMajorMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+// The place of a row among the rows of a front: its pivots, then the rows below them.
+int PositionIn(const Elimination& elimination, int f, int row) {
+  const Front& front = elimination.fronts[f];
+  if (row < front.pivot + front.pivots) return row - front.pivot;
+  const auto begin = elimination.rows.begin() + front.row, end = begin + front.below;
+  const auto found = std::lower_bound(begin, end, row);
+  if (found == end || *found != row) return -1;
+  return front.pivots + static_cast<int>(found - begin);
 }
 
 }  // namespace
 
-SelectedInverse::SelectedInverse(const Sparse& H) {
-  const Eigen::SimplicialLDLT<Sparse> factor(H);
-  if (factor.info() != Eigen::Success || !(factor.vectorD().minCoeff() > 0)) {
-    throw std::runtime_error("the information matrix is not positive definite");
+SelectedInverse::SelectedInverse(const BlockMatrix& A, const BlockCholesky& cholesky)
+    : A_(A), cholesky_(cholesky), inverse_(cholesky.elimination().fronts.back().factor) {
+  for (int f = cholesky.elimination().num_fronts() - 1; f >= 0; --f) Invert(f);
+}
+
+// With L of a front in two parts, P at its pivots and B below them, and M = L_B L_P^-1:
+//   Z_BP = -Z_BB M,   Z_PP = L_P^-T L_P^-1 - M^T Z_BP.
+void SelectedInverse::Invert(int f) {
+  const Front& front = cholesky_.elimination().fronts[f];
+  const BlockCholesky::Columns pivots = cholesky_.Pivots(f);
+  const auto L = pivots.triangularView<Lower>();
+  MatrixXd M = cholesky_.Below(f);
+  L.solveInPlace<Eigen::OnTheRight>(M);
+  MatrixXd root = MatrixXd::Identity(front.pivots, front.pivots);
+  L.solveInPlace(root);
+  Eigen::Map<MatrixXd> Z(inverse_.data() + front.factor, front.rows(), front.pivots);
+  Z.bottomRows(front.below).noalias() = -Below(f) * M;
+  Z.topRows(front.pivots).noalias() = root.transpose() * root;
+  Z.topRows(front.pivots).noalias() -= M.transpose() * Z.bottomRows(front.below);
+}
+
+// The inverse at the rows below a front's pivots: all are in the fronts above, which are known.
+MatrixXd SelectedInverse::Below(int f) const {
+  const Elimination& elimination = cholesky_.elimination();
+  const Front& front = elimination.fronts[f];
+  const int* const rows = elimination.rows.data() + front.row;
+  MatrixXd Z(front.below, front.below);
+  std::vector<int> position(front.below);
+  for (int begin = 0, end = 0; begin < front.below; begin = end) {
+    const int above = cholesky_.FrontOf(rows[begin]);
+    const Front& g = elimination.fronts[above];
+    while (end < front.below && rows[end] < g.pivot + g.pivots) ++end;
+    for (int r = begin; r < front.below; ++r) {
+      position[r] = PositionIn(elimination, above, rows[r]);
+    }
+    for (int c = begin; c < end; ++c) {
+      const double* const column =
+          inverse_.data() + g.factor + std::ptrdiff_t{rows[c] - g.pivot} * g.rows();
+      for (int r = c; r < front.below; ++r) Z(r, c) = Z(c, r) = column[position[r]];
+    }
   }
-  // SimplicialLDLT keeps the unit diagonal implicit: store it.
-  Sparse unit(H.rows(), H.cols());
-  unit.setIdentity();
-  const Sparse strict = factor.matrixL().nestedExpression().triangularView<Eigen::StrictlyLower>();
-  Sparse L = strict + unit;
-  L.makeCompressed();
-  inverse_ = InverseOnPattern(L, factor.vectorD());
-  place_ = factor.permutationP().indices();
+  return Z;
 }
 
-double SelectedInverse::operator()(int row, int column) const {
-  const int i = place_[row], j = place_[column];
-  return inverse_.coeff(std::max(i, j), std::min(i, j));
+MatrixXd SelectedInverse::Block(int i, int j) const {
+  const Elimination& elimination = cholesky_.elimination();
+  const int at_i = elimination.place[A_.offset(i)], at_j = elimination.place[A_.offset(j)];
+  if (at_i < at_j) return Block(j, i).transpose();
+  const int f = cholesky_.FrontOf(at_j);
+  const Front& front = elimination.fronts[f];
+  const int row = PositionIn(elimination, f, at_i);
+  if (row < 0) {
+    throw std::invalid_argument("blocks " + std::to_string(i) + " and " + std::to_string(j) +
+                                " are not coupled");
+  }
+  const Eigen::Map<const MatrixXd> Z(inverse_.data() + front.factor, front.rows(), front.pivots);
+  return Z.block(row, at_j - front.pivot, A_.size(i), A_.size(j));
 }
 
-Eigen::MatrixXd SelectedInverse::Block(int start, int size) const {
-  return Eigen::MatrixXd::NullaryExpr(
-      size, size, [&](int r, int c) { return (*this)(start + r, start + c); });
+MatrixXd InverseAt(const BlockCholesky& cholesky, const std::vector<int>& rows) {
+  const Elimination& elimination = cholesky.elimination();
+  const int fronts = elimination.num_fronts(), columns = static_cast<int>(rows.size());
+  // A unit vector reaches its own front and those above it, and what it reaches depends on no more.
+  std::vector<char> is_reached(fronts, false);
+  for (const int row : rows) {
+    int f = cholesky.FrontOf(elimination.place[row]);
+    while (!is_reached[f]) {
+      is_reached[f] = true;
+      const Front& front = elimination.fronts[f];
+      if (front.below > 0) f = cholesky.FrontOf(elimination.rows[front.row]);
+    }
+  }
+  std::vector<int> reached, start(fronts);
+  int size = 0;
+  for (int f = 0; f < fronts; ++f) {
+    if (!is_reached[f]) continue;
+    reached.push_back(f);
+    start[f] = size;
+    size += elimination.fronts[f].pivots;
+  }
+  const auto place = [&](int row) {
+    const int f = cholesky.FrontOf(row);
+    return start[f] + row - elimination.fronts[f].pivot;
+  };
+
+  RowMajorMatrix X = RowMajorMatrix::Zero(size, columns);
+  for (int c = 0; c < columns; ++c) X(place(elimination.place[rows[c]]), c) = 1;
+  for (const int f : reached) {
+    const Front& front = elimination.fronts[f];
+    auto own = X.middleRows(start[f], front.pivots);
+    cholesky.Pivots(f).triangularView<Lower>().solveInPlace(own);
+    const RowMajorMatrix below = cholesky.Below(f) * own;
+    for (int r = 0; r < front.below; ++r) {
+      X.row(place(elimination.rows[front.row + r])) -= below.row(r);
+    }
+  }
+  for (auto f = reached.rbegin(); f != reached.rend(); ++f) {
+    const Front& front = elimination.fronts[*f];
+    RowMajorMatrix below(front.below, columns);
+    for (int r = 0; r < front.below; ++r) {
+      below.row(r) = X.row(place(elimination.rows[front.row + r]));
+    }
+    auto own = X.middleRows(start[*f], front.pivots);
+    own.noalias() -= cholesky.Below(*f).transpose() * below;
+    cholesky.Pivots(*f).transpose().triangularView<Eigen::Upper>().solveInPlace(own);
+  }
+  MatrixXd inverse(columns, columns);
+  for (int r = 0; r < columns; ++r) inverse.row(r) = X.row(place(elimination.place[rows[r]]));
+  return inverse;
 }
 
 }  // namespace dqslam

@@ -1,26 +1,37 @@
 // Entries of the inverse of a sparse symmetric positive definite matrix.
 #pragma once
 
-#include <Eigen/SparseCore>
+#include <Eigen/Core>
+#include <vector>
+
+#include "dqslam/linear/block_cholesky.h"
+#include "dqslam/linear/block_matrix.h"
 
 namespace dqslam {
 
-/// H^-1 on the pattern of the Cholesky factor of H (Takahashi, Fagan & Chin 1973). That pattern
-/// contains the pattern of H.
+/// A^-1 on the pattern of the Cholesky factor of A (Takahashi, Fagan & Chin 1973), front by front.
+/// That pattern contains the pattern of A.
 class SelectedInverse {
  public:
-  /// Throws std::runtime_error when H is not positive definite.
-  explicit SelectedInverse(const Eigen::SparseMatrix<double>& H);
+  /// `cholesky` is a factorization of A with whatever damping, which counts as a part of A.  Both
+  /// must outlive the result.
+  SelectedInverse(const BlockMatrix& A, const BlockCholesky& cholesky);
 
-  /// An entry of H^-1 that H stores. For any other entry the result may be 0 instead of its value.
-  double operator()(int row, int column) const;
-
-  /// A square block on the diagonal of H^-1. H must store all entries of that block, also zeros.
-  Eigen::MatrixXd Block(int start, int size) const;
+  /// Block (i, j) of A^-1.  Throws std::invalid_argument unless i == j or the factor couples them,
+  /// as it does whenever A does.
+  Eigen::MatrixXd Block(int i, int j) const;
 
  private:
-  Eigen::SparseMatrix<double> inverse_;  // lower triangle, rows and columns in the factor's order
-  Eigen::VectorXi place_;                // where the factor puts a row of H
+  void Invert(int f);
+  Eigen::MatrixXd Below(int f) const;
+
+  const BlockMatrix& A_;
+  const BlockCholesky& cholesky_;
+  Eigen::VectorXd inverse_;  // each front's rows() x pivots, where the factor has the same front
 };
+
+/// The entries of A^-1 at some rows and the same columns, each coupled with each other or not, from
+/// a factorization of A.  Takes time and memory for what is eliminated after these rows only.
+Eigen::MatrixXd InverseAt(const BlockCholesky& cholesky, const std::vector<int>& rows);
 
 }  // namespace dqslam

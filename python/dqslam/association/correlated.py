@@ -163,6 +163,8 @@ class CorrelatedProblem:
             gradient[own] -= slope[:, k:].sum(axis=0)
             by_object = whitener.precision @ j[:, :, k:]
             hessian[own, own] += np.einsum("eia,eib->ab", j[:, :, k:], by_object)
+            # What the boxes leave open of an object stays as it is, as uncertain as it is far.
+            hessian[own, own] += np.eye(9) / np.median(np.sum(towards**2, axis=1))
             if keeps_poses:
                 continue
             cross = np.einsum("eia,eib->iab", j[:, :, :k], by_object)

@@ -17,9 +17,9 @@ import numpy as np
 
 from dqslam import _core
 from dqslam._checks import Bools, Floats, Ints
-from dqslam.association.thinning import compose_covariance
 from dqslam.assumptions import OdometryNoise
 from dqslam.recording import Recording
+from dqslam.recording.odometry import compose_covariance
 
 # A kind must outweigh this many residuals that agree with the level believed: few change little.
 PRIOR_RESIDUALS = 1.0
@@ -91,7 +91,7 @@ class StepNoise:
                 *(f"rotation_{axis}" for axis in "xyz"[t - k :]),
                 *OF_MOTION,
             ),
-            np.stack([compose_covariance(recording, unit, keyframes) for unit in single]),
+            np.stack([compose_covariance(recording.odometry, unit, keyframes) for unit in single]),
             np.column_stack([variance[:, :t].mean(axis=1), variance[:, t:].mean(axis=1)]),
         )
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from dqslam import _core
 from dqslam.recording import Recording
+from dqslam.recording.odometry import compose_covariance
 
 
 def thin_recording(recording: Recording, keyframes: NDArray[np.int64]) -> Recording:
@@ -26,28 +27,10 @@ def thin_recording(recording: Recording, keyframes: NDArray[np.int64]) -> Record
             odometry,
             first_pose=path[keyframes[0]],
             relative=_core.between(model, path[keyframes[:-1]], path[keyframes[1:]]),
-            covariance=compose_covariance(recording, odometry.covariance, keyframes),
+            covariance=compose_covariance(odometry, odometry.covariance, keyframes),
         ),
         detections=replace(kept, pose=row[kept.pose]),
     )
-
-
-def compose_covariance(
-    recording: Recording, covariance: NDArray[np.float64], keyframes: NDArray[np.int64]
-) -> NDArray[np.float64]:
-    """Return the covariance of the motion between keyframes from that of each step, (s, k, k).
-
-    As many as there are keyframes, less one: shape (n - 1, k, k).
-    """
-    odometry = recording.odometry
-    path = _core.dead_reckon(odometry.pose_model, odometry.first_pose, odometry.relative)
-    ends = np.repeat(keyframes[1:], np.diff(keyframes))
-    steps = np.arange(keyframes[0], keyframes[-1])
-    # The error of a step, at its end, is one of the next keyframe as seen from there.
-    end_from_step = _core.between(odometry.pose_model, path[ends], path[steps + 1])
-    moved = _core.adjoint(odometry.pose_model, end_from_step)
-    spread = moved @ covariance[steps] @ moved.transpose(0, 2, 1)
-    return np.asarray(np.add.reduceat(spread, keyframes[:-1] - keyframes[0], axis=0))
 
 
 def fill_in(

@@ -226,6 +226,8 @@ def _only_choices(
     pairs: list[tuple[int, int]], predicted: Floats, box: Floats, allowed: Bools
 ) -> list[tuple[int, int]]:
     """Pair what is left where neither has another choice around."""
+    if len(pairs) == min(len(predicted), len(box)):
+        return []
     size, new_size = predicted[:, 2:] - predicted[:, :2], box[:, 2:] - box[:, :2]
     offset = np.linalg.norm(_centers(predicted)[:, None] - _centers(box), axis=2)
     distance = np.where(allowed, offset / np.sqrt(size.prod(axis=1))[:, None], np.inf)

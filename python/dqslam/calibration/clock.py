@@ -16,7 +16,7 @@ from dqslam import _core
 from dqslam._checks import Bools
 from dqslam.graph import Graph
 from dqslam.io import nearest_pose
-from dqslam.subgraph import rebuilt, select_objects
+from dqslam.subgraph import rebuilt, select_objects, select_poses
 
 # The least number of images, and of boxes, that tell.
 FEWEST_IMAGES, FEWEST_BOXES = 20, 60
@@ -203,26 +203,22 @@ class _Search:
         """Return the problem of some boxes at these poses, and its start."""
         core, table = self._graph.core, self._graph.core.boxes
         shown = np.unique(table.object[rows])
+        place = np.full(core.num_objects, -1)
+        place[shown] = np.arange(len(shown))
         boxes = _core.BoxTable(
             pose=pose,
-            object=table.object[rows],
+            object=place[table.object[rows]],
             box=table.box[rows],
             covariance=table.covariance[rows],
             truncated=table.truncated[rows],
         )
-        state = _core.State(
-            self._state.poses, self._state.landmarks[shown], shared=self._state.shared
+        whole = core if len(shown) == core.num_objects else select_objects(core, shown)
+        # Poses that nothing is measured from follow their neighbors: they would only cost time.
+        kept = np.unique(np.concatenate([pose, *(one.pose for one in whole.measurements)]))
+        moved = select_poses(rebuilt(whole, boxes=boxes), kept)
+        poses = self._state.poses
+        return moved, _core.State(
+            poses[kept] if moved.num_poses == len(kept) else poses,
+            self._state.landmarks[shown],
+            shared=self._state.shared,
         )
-        whole = core
-        if len(shown) < core.num_objects:
-            whole = select_objects(core, shown)
-            place = np.full(core.num_objects, -1)
-            place[shown] = np.arange(len(shown))
-            boxes = _core.BoxTable(
-                pose=pose,
-                object=place[table.object[rows]],
-                box=table.box[rows],
-                covariance=table.covariance[rows],
-                truncated=table.truncated[rows],
-            )
-        return rebuilt(whole, boxes=boxes), state

@@ -98,11 +98,21 @@ def distorted_or_nan(camera: _core.Camera, undistorted: Floats, tilt: ArrayLike 
     return recorded
 
 
-def undistorted_or_nan(camera: _core.Camera, recorded: Floats, tilt: ArrayLike = np.nan) -> Floats:
-    """Return what ``undistort_boxes`` does, and NaN for boxes beyond the range of the lens."""
-    given = _given_tilts(tilt, len(recorded))
-    tilts = np.where(np.isnan(given), _straight_tilts(camera, recorded), given)
-    box = _start(camera, recorded)
+def undistorted_or_nan(
+    camera: _core.Camera,
+    recorded: Floats,
+    tilt: ArrayLike = np.nan,
+    *,
+    near: Floats | None = None,
+) -> Floats:
+    """Return what ``undistort_boxes`` does, and NaN for boxes beyond the range of the lens.
+
+    ``near`` (m, 4) are boxes that are near those looked for, where such are known.
+    """
+    tilts = _given_tilts(tilt, len(recorded)).copy()
+    unknown = np.flatnonzero(np.isnan(tilts))
+    tilts[unknown] = _straight_tilts(camera, recorded[unknown])
+    box = _start(camera, recorded) if near is None else near.copy()
     found = np.full_like(box, np.nan)
     rows = np.flatnonzero(np.isfinite(box).all(axis=1) & np.isfinite(tilts))
     touching = None

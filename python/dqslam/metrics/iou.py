@@ -11,8 +11,10 @@ def box_iou(boxes: Floats, others: Floats) -> Floats:
     """Return the IoU of boxes [u_min, v_min, u_max, v_max], shape (..., 4), pairwise."""
     low = np.maximum(boxes[..., :2], others[..., :2])
     high = np.minimum(boxes[..., 2:], others[..., 2:])
-    both = np.prod((high - low).clip(min=0.0), axis=-1)
-    area, other_area = (np.prod(b[..., 2:] - b[..., :2], axis=-1) for b in (boxes, others))
+    common = (high - low).clip(min=0.0)
+    both = common[..., 0] * common[..., 1]
+    sides = (b[..., 2:] - b[..., :2] for b in (boxes, others))
+    area, other_area = (side[..., 0] * side[..., 1] for side in sides)
     return np.asarray(both / (area + other_area - both))
 
 

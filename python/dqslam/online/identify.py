@@ -46,8 +46,8 @@ KEYFRAMES_UNTIL_REASSIGNED = 10
 # Duplicates, sizes, movers and noise are looked at each time there are so many new keyframes, one
 # of them at each keyframe ...
 KEYFRAMES_PER_JUDGMENT = 5
-# ... and so many objects, whether they moved: each takes an estimate of the window.
-SUSPECTS_AT_A_TIME = 2
+# ... and one object, whether it moved: that takes two estimates of the window.
+SUSPECTS_AT_A_TIME = 1
 # An object is out of view after so many keyframes without a box: it is asked whether it moved.
 KEYFRAMES_UNTIL_DEPARTED = 3
 

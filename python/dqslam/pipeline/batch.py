@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from dqslam import _core
 from dqslam.association import (
+    FINAL,
     Association,
     FinalEstimate,
     associate,
@@ -36,8 +37,10 @@ from dqslam.uncertainty import (
 # Boxes are undistorted again for the map until they move by less than this [px], or so many times.
 _LENS_PX = 0.02
 _LENS_ROUNDS = 4
-# With fewer images to a keyframe, the others have little to add to what the keyframes tell.
-FEWEST_IMAGES_A_KEYFRAME = 3
+# With fewer images to a keyframe, the others have little to add to what the keyframes tell. Without
+# final ids, the association believed a noise of boxes that has a lower limit and may be far too
+# high: then fewer are worth their time.
+FEWEST_IMAGES_A_KEYFRAME, FEWEST_WITHOUT_IDS = 3.0, 1.25
 
 
 def estimate_batch(
@@ -147,7 +150,7 @@ def _finish(
     )
     final = None
     if solver.mode == _core.Mode.SLAM and options.box_noise is None:
-        final = _use_all_images(recording, found, solved.poses, estimate)
+        final = _use_all_images(recording, found, solved.poses, estimate, options.trust_ids)
     if final is not None:
         estimate = replace(
             estimate,
@@ -186,7 +189,11 @@ def _step_covariance(recording: Recording, found: Association) -> NDArray[np.flo
 
 
 def _use_all_images(
-    recording: Recording, found: Association, poses: NDArray[np.float64], estimate: Estimate
+    recording: Recording,
+    found: Association,
+    poses: NDArray[np.float64],
+    estimate: Estimate,
+    trust: float,
 ) -> FinalEstimate | None:
     """Estimate by all images, from the poses of keyframes (f, d) and the objects of an estimate.
 
@@ -195,8 +202,8 @@ def _use_all_images(
     """
     object_id = np.where(found.repeats, -1, found.object_id)
     images = np.unique(recording.detections.pose[object_id >= 0])
-    few = len(images) < FEWEST_IMAGES_A_KEYFRAME * len(found.keyframes)
-    if few or recording.camera.has_distortion:
+    fewest = FEWEST_IMAGES_A_KEYFRAME if trust == FINAL else FEWEST_WITHOUT_IDS
+    if len(images) < fewest * len(found.keyframes) or recording.camera.has_distortion:
         return None
     place = np.searchsorted(estimate.object_ids, object_id)
     place = place.clip(max=len(estimate.object_ids) - 1)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dqslam import _core
+from dqslam.association.images import group_by_pose
 from dqslam.estimate import Estimate
 from dqslam.metrics import box_iou
 from dqslam.recording import Detections
@@ -50,8 +51,7 @@ def overlap_with_map(
     mapped = np.array(estimate.class_names, dtype=object)
     real = np.flatnonzero(estimate.is_ellipsoid)
     solids = estimate.solids.take(real)
-    for pose in np.unique(boxes.pose):
-        rows = np.flatnonzero(boxes.pose == pose)
+    for pose, rows in group_by_pose(boxes.pose):
         here = np.repeat(estimate.poses[pose][None], len(real), axis=0)
         predicted, in_front = project_to_boxes(estimate.pose_model, estimate.camera, here, solids)
         predicted = _inside(estimate.camera, np.where(in_front[:, None], predicted, -2.0))

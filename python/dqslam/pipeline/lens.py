@@ -80,7 +80,7 @@ def exact_boxes(
     tilts = np.full(len(boxes), np.nan)
     real = np.flatnonzero(np.isfinite(ellipsoids).all(axis=1))
     tilts[real] = outline_tilts(model, camera, poses[real], ellipsoids[real])
-    exact = undistorted_or_nan(camera, distort_boxes(camera, boxes), tilts)
+    exact = undistorted_or_nan(camera, distort_boxes(camera, boxes), tilts, near=boxes)
     return np.where(np.isnan(exact), boxes, exact)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dqslam import _core
-from dqslam._checks import Floats, as_covariances, as_floats, assign
+from dqslam._checks import Floats, Ints, as_covariances, as_floats, assign
 from dqslam._repr import counted
 from dqslam.recording.poses import as_poses, pose_model_of, tangent_size
 
@@ -113,3 +113,19 @@ class Odometry:
         added = np.zeros_like(self.covariance)
         added[:, :size, :size] = along[:, :, None] * along[:, None, :] * length[:, :, None]
         return replace(self, covariance=self.covariance + 2.0 * sigma**2 * length_m * added)
+
+
+def compose_covariance(odometry: Odometry, covariance: Floats, keyframes: Ints) -> Floats:
+    """Return the covariance of the motion between keyframes from that of each step, (n - 1, k, k).
+
+    As many as there are keyframes, ascending, less one: shape (f - 1, k, k).
+    """
+    model = odometry.pose_model
+    path = _core.dead_reckon(model, odometry.first_pose, odometry.relative)
+    ends = np.repeat(keyframes[1:], np.diff(keyframes))
+    steps = np.arange(keyframes[0], keyframes[-1])
+    # The error of a step, at its end, is one of the next keyframe as seen from there.
+    end_from_step = _core.between(model, path[ends], path[steps + 1])
+    moved = _core.adjoint(model, end_from_step)
+    spread = moved @ covariance[steps] @ moved.transpose(0, 2, 1)
+    return np.asarray(np.add.reduceat(spread, keyframes[:-1] - keyframes[0], axis=0))
