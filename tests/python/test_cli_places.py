@@ -8,7 +8,7 @@ import pytest
 
 import dqslam as dq
 from dqslam.cli import main
-from dqslam.places.changes_files import read_changes, write_changes
+from dqslam.places.changes.files import read_changes, write_changes
 from orbit import CAMERA
 from small_place import CENTERS, NAMES, boxes_at, pose_at, write_map
 

@@ -6,10 +6,9 @@ from benchmarks.places import rooms
 from scipy.spatial import cKDTree
 
 import dqslam as dq
-from dqslam.places import locate_quick
-from dqslam.places.locate_hypotheses import Hypotheses
-from dqslam.places.locate_map import REACH
-from dqslam.places.locate_pairs import (
+from dqslam.places.location import quick_score
+from dqslam.places.location.hypotheses import Hypotheses
+from dqslam.places.location.pairs import (
     _MOST_COMPARED,
     AGREE,
     AGREE_LARGE,
@@ -21,6 +20,7 @@ from dqslam.places.locate_pairs import (
     triangles,
     within_budget,
 )
+from dqslam.places.location.place_map import REACH
 
 
 def strewn(random, boxes, objects, extent):
@@ -120,8 +120,8 @@ def test_objects_near_a_hypothesis_score_as_all_do():
     usual = pairings.log_distance.reshape(4, 50)
     assert np.ptp(usual - usual[0], axis=1) == pytest.approx(np.zeros(4), abs=1e-12)
     gain = random.uniform(1.0, 9.0, len(pairings))
-    every = locate_quick._score_all(place, pairings, gain, found)
-    near = locate_quick._score_near(place, pairings, gain, found)
+    every = quick_score._score_all(place, pairings, gain, found)
+    near = quick_score._score_near(place, pairings, gain, found)
     assert every.max() > 1.0
     np.testing.assert_allclose(near, every, rtol=1e-9)
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from dqslam._colors import object_colors
 from dqslam.places.landmarks import Landmarks
-from dqslam.places.locate_files import ImageLocation
+from dqslam.places.location.files import ImageLocation
 from dqslam.plot.above import CIRCLE, FromAbove, from_above, outline
 from dqslam.plot.labels import place_labels
 from dqslam.plot.style import (

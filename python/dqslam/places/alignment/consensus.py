@@ -8,13 +8,13 @@ import numpy as np
 
 from dqslam._checks import Floats, Ints
 from dqslam._repr import counted
-from dqslam.places.alignment import Alignment, CannotTellError, Rival
-from dqslam.places.judge import CHANCE, Hypothesis, doubt, judge, lead, match_again
+from dqslam.places.alignment.judge import CHANCE, Hypothesis, doubt, judge, lead, match_again
+from dqslam.places.alignment.likelihood import Objects, Target, spacing
+from dqslam.places.alignment.refine import Refined, refine
+from dqslam.places.alignment.result import Alignment, CannotTellError, Rival
+from dqslam.places.alignment.rigid import MotionModel, Motions
+from dqslam.places.alignment.search import search
 from dqslam.places.landmarks import Landmarks, Source, read_landmarks
-from dqslam.places.likelihood import Objects, Target, spacing
-from dqslam.places.refine import Refined, refine
-from dqslam.places.rigid import MotionModel, Motions
-from dqslam.places.search import search
 
 MotionName = Literal["auto", "se2", "se3"]
 # Centers of unknown uncertainty are assumed to be known to this share of the room of an object.

@@ -16,10 +16,10 @@ from dqslam.io import Results
 from dqslam.io.results import load_map_results
 from dqslam.lens import camera_with, lens_of
 from dqslam.places.landmarks import read_landmarks
-from dqslam.places.locate_boxes import LabeledBoxes, check_labels, label_boxes, labels_of_array
-from dqslam.places.locate_map import ImageBoxes, PlaceMap
-from dqslam.places.locate_score import SE3, Frame
-from dqslam.places.locate_search import Places, find_places
+from dqslam.places.location.boxes import LabeledBoxes, check_labels, label_boxes, labels_of_array
+from dqslam.places.location.place_map import ImageBoxes, PlaceMap
+from dqslam.places.location.score import SE3, Frame
+from dqslam.places.location.search import Places, find_places
 from dqslam.recording import Detections
 
 # A model of independent errors is too sure of itself, and the more so the more boxes it takes for

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from dqslam._checks import Floats, Ints
-from dqslam.places.likelihood import Objects, Target, log_densities
-from dqslam.places.rigid import MotionModel, Motions
-from dqslam.places.triangles import find_triangles, match_triangles
+from dqslam.places.alignment.likelihood import Objects, Target, log_densities
+from dqslam.places.alignment.rigid import MotionModel, Motions
+from dqslam.places.alignment.triangles import find_triangles, match_triangles
 
 _TRIANGLES = 150_000  # of a map
 _MATCHES = 3_000_000  # of triangles

@@ -14,7 +14,7 @@ from dqslam import io as files
 from dqslam.io import FileError, Notes, ReadOptions
 from dqslam.io.files import write_text
 from dqslam.lens import undistorted_or_nan
-from dqslam.places.locate import Location, locate, place_of
+from dqslam.places.location.location import Location, locate, place_of
 from dqslam.recording import Detections
 
 TABLE = "locations.csv"
