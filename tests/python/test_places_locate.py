@@ -7,6 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import dqslam as dq
+from dqslam.places.location.boxes import label_boxes
 from small_place import (
     AXES,
     CENTERS,
@@ -160,6 +161,53 @@ def test_the_right_label_among_several_is_used(place):
     assert found.is_found
     assert apart(found, pose)[0] < 0.01
     np.testing.assert_array_equal(found.object_id, 10 + np.arange(len(NAMES)))
+
+
+def with_other_classes(boxes, names, share):
+    """Give boxes their true classes as second ones, of this share of the confidence."""
+    number = {name: one for one, name in boxes.class_names.items()}
+    other = np.array([number[name] for name in names])
+    other[other == boxes.class_id] = -1
+    score = np.where(other < 0, 0.0, share)
+    return replace(
+        boxes,
+        score=np.full(len(boxes), 1.0 - share),
+        other_class_id=other[:, None],
+        other_score=score[:, None],
+    )
+
+
+def test_other_classes_of_a_box_are_labels_by_their_scores(place):
+    """They answer as the same names with weights, where the first classes alone do not."""
+    pose = pose_at(0.4, 2.4, 1.2)
+    wrong = ("book", "cup", "bowl", "plant", "lamp", "cup", "lamp", "book")
+    first = detections_of(boxes_at(pose), names=wrong)
+    assert not dq.locate(place, first, LENS).is_found
+    found = dq.locate(place, with_other_classes(first, NAMES, 0.45), LENS)
+    labels = [{a: 0.55, b: 0.45} for a, b in zip(wrong, NAMES, strict=True)]
+    by_name = dq.locate(place, first, LENS, labels=labels)
+    assert found.is_found
+    assert apart(found, pose)[0] < 0.01
+    np.testing.assert_allclose(found.pose, by_name.pose, rtol=0.0, atol=2e-3)
+
+
+def test_other_classes_are_those_of_the_box_that_is_kept():
+    """Of two boxes in one place, weights of all classes add up; -1 and a score of 0 are none."""
+    box = np.array([[10.0, 10.0, 50.0, 60.0], [11.0, 10.0, 50.0, 60.0], [80.0, 80.0, 99.0, 99.0]])
+    boxes = dq.Detections(
+        pose=np.zeros(3, dtype=int),
+        box=box,
+        score=np.array([0.5, 0.7, 0.4]),
+        class_id=np.array([0, 1, 2]),
+        object_id=np.full(3, -1),
+        class_names={0: "cup", 1: "bowl", 2: "lamp"},
+        other_class_id=np.array([[1, 2], [2, -1], [0, -1]]),
+        other_score=np.array([[0.2, 0.1], [0.3, 0.9], [0.0, 0.0]]),
+    )
+    labeled = label_boxes(boxes, 0, None)
+    np.testing.assert_array_equal(labeled.row, [1, 2])
+    assert labeled.labels[0] == pytest.approx({"bowl": 0.9, "lamp": 0.4, "cup": 0.5})
+    assert labeled.labels[1] == {"lamp": 0.4}
 
 
 def test_boxes_of_several_classes_in_one_place_are_one(place):

@@ -111,14 +111,15 @@ def locate(
         The map: results, their folder, a ``map.json`` or CSV of objects with sizes, or
         ``PlaceMap.of(results)``, which saves time if many images are located.
     boxes
-        Boxes in undistorted pixels. Ids of objects are not used. Boxes of different classes that
-        overlap by an intersection over union of 0.8 count as one box with several labels.
+        Boxes in undistorted pixels. Ids of objects are not used. A box may be of its other classes,
+        too, in proportion to their scores. Boxes of different classes that overlap by an
+        intersection over union of 0.8 count as one box with several labels.
     camera
         The camera of the image, which may differ from the map's. Its mount is ignored.
     labels
-        What each box may be instead of its class: names of classes with weights, shape (m,), or an
-        array of probabilities, shape (m, c), whose columns are the classes of
-        ``boxes.class_names`` by their numbers.
+        What each box may be instead of its classes: names with weights, shape (m,), or an array of
+        probabilities, shape (m, c), whose columns are the classes of ``boxes.class_names`` by their
+        numbers.
     odometry
         Poses of the camera in a frame of its own, world_from_camera, shape (n, 7), if the boxes are
         of several images: ``boxes.pose`` are rows of it.
