@@ -8,6 +8,9 @@ from scipy.spatial.transform import Rotation
 
 import dqslam as dq
 from dqslam.places.location.boxes import label_boxes
+from dqslam.places.location.location import _probabilities
+from dqslam.places.location.score import Matches
+from dqslam.places.location.search import Places
 from small_place import (
     AXES,
     CENTERS,
@@ -55,6 +58,40 @@ def test_the_covariance_covers_the_error(place):
         error = np.concatenate([rotation.inv().apply(pose[:3] - found.pose[:3]), turn.as_rotvec()])
         nees.append(error @ np.linalg.inv(found.covariance) @ error)
     assert 0.5 < np.mean(nees) < 8.0
+
+
+def test_errors_with_a_long_tail_widen_the_covariance(place):
+    boxes = detections_of(boxes_at(pose_at(-1.8, 1.9, 1.4), noise_px=1.0))
+    wider = replace(place, sensor=replace(place.sensor, tail=2.0 * place.sensor.tail))
+    usual, wide = (dq.locate(one, boxes, LENS) for one in (place, wider))
+    np.testing.assert_array_equal(usual.pose, wide.pose)
+    np.testing.assert_allclose(wide.covariance, 2.0 * usual.covariance, rtol=0.05)
+
+
+def test_an_object_in_many_images_counts_once_for_the_confidence():
+    """By hand: of 8 boxes of 4 objects, half of the margin of 20 over the rival counts."""
+    none = np.zeros(0, dtype=np.int64)
+    places = Places(
+        poses=np.zeros((2, 7)),
+        log_odds=np.array([30.0, 10.0]),
+        covariance=np.zeros((2, 6, 6)),
+        matches=Matches(none, none, none, none),
+        missing=np.zeros(2, dtype=np.int64),
+        log_elsewhere=-50.0,
+    )
+    best, rival = _probabilities(places, 8, 4)
+    assert np.log(best / (1.0 - best)) == pytest.approx(1.3 + 0.36 * 10.0 - 2.3 * np.log(4.0))
+    assert rival == pytest.approx(1.0 - best)
+    once, _ = _probabilities(places, 4, 4)
+    assert np.log(once / (1.0 - once)) == pytest.approx(1.3 + 0.36 * 20.0 - 2.3 * np.log(4.0))
+
+
+def test_boxes_of_two_objects_in_many_images_are_too_few(place):
+    poses = np.array([pose_at(0.3 * k, -2.2, 1.0) for k in range(4)])
+    box = np.concatenate([boxes_at(pose)[:2] for pose in poses])
+    boxes = detections_of(box, NAMES[:2] * 4, pose=np.repeat(np.arange(4), 2))
+    found = dq.locate(place, boxes, LENS, odometry=poses)
+    assert found.reason.startswith("too few: 8 of 8 boxes are of classes in the map")
 
 
 def test_the_answer_moves_with_the_map(place, tmp_path):

@@ -89,7 +89,7 @@ def _weigh(place: PlaceMap, scorer: Scorer, scored: Scored, elsewhere: float) ->
     joined, covariance = _join(
         scored.poses,
         log_odds,
-        np.asarray(np.linalg.inv(information), dtype=np.float64),
+        np.asarray(place.sensor.tail * np.linalg.inv(information), dtype=np.float64),
         best,
         sight,
     )
