@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from benchmarks.places import changes, locate, locate_worlds, robots_table
+from benchmarks.places import changes, locate, locate_worlds, robots_table, walks
 
 app = typer.Typer(
     add_completion=False,
@@ -16,6 +16,7 @@ for _name, _case in (
     ("real", robots_table.align_real),
     ("rooms", locate.count_rooms),
     ("worlds", locate_worlds.count_worlds),
+    ("walks", walks.count_walks),
     ("recording", locate.locate_recording),
     ("large", locate.locate_in_large_map),
     ("changes", changes.count_changes),

@@ -109,10 +109,10 @@ if TYPE_CHECKING:  # the one list of public names, a line each: lazy_exports rea
     from dqslam.places.changes import Change as Change
     from dqslam.places.changes import Changes as Changes
     from dqslam.places.changes import changes as changes
-    from dqslam.places.locate import Candidate as Candidate
-    from dqslam.places.locate import Location as Location
-    from dqslam.places.locate import locate as locate
-    from dqslam.places.locate_map import PlaceMap as PlaceMap
+    from dqslam.places.location import Candidate as Candidate
+    from dqslam.places.location import Location as Location
+    from dqslam.places.location import PlaceMap as PlaceMap
+    from dqslam.places.location import locate as locate
     from dqslam.plot import plot_maps as plot_maps
     from dqslam.pose_graphs import pose_graph as pose_graph
     from dqslam.recording import AbsolutePositions as AbsolutePositions

@@ -6,7 +6,17 @@ import pytest
 from benchmarks.places.__main__ import app
 from typer.testing import CliRunner
 
-CASES = ("robots", "real", "rooms", "worlds", "recording", "large", "changes", "halves")
+CASES = (
+    "robots",
+    "real",
+    "rooms",
+    "worlds",
+    "walks",
+    "recording",
+    "large",
+    "changes",
+    "halves",
+)
 
 
 def test_help_names_each_case():

@@ -8,7 +8,7 @@ import pytest
 
 import dqslam as dq
 from dqslam.cli import main
-from dqslam.places.changes_files import read_changes, write_changes
+from dqslam.places.changes.files import read_changes, write_changes
 from orbit import CAMERA
 from small_place import CENTERS, NAMES, boxes_at, pose_at, write_map
 
@@ -51,6 +51,20 @@ def test_locate_writes_a_row_for_each_image(files, capsys):
     assert [one["found"] for one in printed["images"]] == [True, True, False]
     assert np.shape(printed["images"][0]["candidates"][0]["covariance"]) == (6, 6)
     assert (files / "out" / "locations.png").stat().st_size > 10_000
+
+
+def test_locate_reads_other_classes_of_boxes(files, capsys):
+    """The first class of each box is the next one of the list, the second one is right."""
+    kinds = sorted(set(NAMES))
+    lines = ["timestamp,x1,y1,x2,y2,score,class_name,class_name_2,score_2"]
+    for name, box in zip(NAMES, boxes_at(POSES[0]), strict=True):
+        wrong = kinds[(kinds.index(name) + 1) % len(kinds)]
+        lines.append(f"0,{','.join(f'{x:.6f}' for x in box)},0.5,{wrong},{name},0.45")
+    (files / "boxes.csv").write_text("\n".join(lines) + "\n")
+    assert main(arguments(files, "--json")) == 0
+    image = json.loads(capsys.readouterr().out)["images"][0]
+    assert image["found"]
+    np.testing.assert_allclose(image["candidates"][0]["pose"][:3], POSES[0][:3], atol=5e-3)
 
 
 def test_locate_prints_why_there_is_no_answer(files, capsys):

@@ -6,6 +6,7 @@ from scipy.spatial.transform import Rotation
 
 import dqslam as dq
 from dqslam.metrics import align_rigid
+from dqslam.places.alignment.search import _different
 from planted_maps import landmarks, motion, moved, strewn, two_maps
 from realdata import recording
 
@@ -168,3 +169,43 @@ def test_three_robots_on_a_real_car_park_agree_around_a_loop():
     assert np.degrees(abs(np.arctan2(loop[1, 0], loop[0, 0]))) < 0.07
     middle = np.append(dq.read_landmarks(one).centers.mean(axis=0), 1.0)
     assert np.hypot(*(loop @ middle - middle)[:2]) < 0.04
+
+
+def tables(random):
+    """Return tables with four chairs each, which all are alike, and their classes."""
+    middle, turn = random.uniform(0.0, 20.0, (7, 2)), random.uniform(0.0, np.pi, 7)
+    corner = np.array([[0.8, 0.5], [-0.8, 0.5], [0.8, -0.5], [-0.8, -0.5]])
+    places, classes = list(middle), ["table"] * 7
+    for place, angle in zip(middle, turn, strict=True):
+        own = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+        places += list(place + (corner + random.normal(0.0, 0.08, (4, 2))) @ own.T)
+        classes += ["chair"] * 4
+    height = np.where(np.array(classes) == "table", 0.4, 0.5)
+    return np.column_stack([places, height + random.normal(0.0, 0.03, len(classes))]), classes
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_a_map_upside_down_is_turned_over_or_refused(seed):
+    """Groups that repeat agree about upright motions, too, with less evidence."""
+    random = np.random.default_rng(seed)
+    places, classes = tables(random)
+    over = np.diag([1.0, -1.0, -1.0, 1.0])
+    over[:3, 3] = [7.0, 2.0, -1.0]
+    maps = []
+    for matrix in (np.eye(4), over):
+        rows = np.flatnonzero(random.random(len(classes)) < 0.8)
+        seen = moved(matrix, places[rows] + random.normal(0.0, 0.05, (len(rows), 3)))
+        maps.append(landmarks(seen, [classes[row] for row in rows]))
+    try:
+        found = dq.align(*maps)
+    except dq.CannotTellError:
+        return
+    assert found.motion == "se3"
+    np.testing.assert_allclose(found.b_from_a[:3, :3], over[:3, :3], atol=0.05)
+
+
+def test_motions_that_pair_objects_alike_are_one():
+    """By hand: the second shares two of three pairs of the first, the third one, the last none."""
+    partner = np.array([[0, 1, 2, -1], [0, 1, 5, 7], [0, 4, 6, 3], [-1, -1, -1, -1], [9, 9, 9, 9]])
+    np.testing.assert_array_equal(_different(partner, 10), [0, 2, 3, 4])
+    np.testing.assert_array_equal(_different(partner, 2), [0, 2])

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import dqslam as dq
-from dqslam.places.changes_files import distance_and_sigma, read_alignment, write_changes
-from dqslam.places.changes_map import SeenMap, missed
+from dqslam.places.changes.files import distance_and_sigma, read_alignment, write_changes
+from dqslam.places.changes.seen_map import SeenMap, missed
 from dqslam.places.visibility import view_objects
 from small_place import CENTERS, NAMES, pose_at, write_map, write_turned
 

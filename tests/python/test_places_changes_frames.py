@@ -9,9 +9,9 @@ from scipy.spatial.transform import Rotation
 
 import dqslam as dq
 from dqslam.cli import main
-from dqslam.places.changes_files import read_alignment
-from dqslam.places.changes_frames import covariance_in_b, one_frame_evidence
-from dqslam.places.changes_map import SeenMap
+from dqslam.places.changes.files import read_alignment
+from dqslam.places.changes.frames import covariance_in_b, one_frame_evidence
+from dqslam.places.changes.seen_map import SeenMap
 from small_place import CENTERS, NAMES, write_map, write_turned
 
 HERE = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])

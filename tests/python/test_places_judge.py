@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from dqslam.places.judge import CHANCE, RIVAL, Hypothesis, doubt, lead, tail_of
-from dqslam.places.rigid import Motions
+from dqslam.places.alignment.judge import CHANCE, RIVAL, Hypothesis, doubt, lead, tail_of
+from dqslam.places.alignment.rigid import Motions
 
 # Of twelve runners-up of one class: the six best are 2, 4, 6, 8, 10 and 12.
 RUNNERS_UP = np.array([12.0, 10.0, 8.0, 6.0, 4.0, 2.0, 1.0, 0.0, 0.0, -1.0, -1.0, -2.0])

@@ -7,6 +7,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import dqslam as dq
+from dqslam.places.location.boxes import label_boxes
+from dqslam.places.location.location import _probabilities
+from dqslam.places.location.score import Matches
+from dqslam.places.location.search import Places
 from small_place import (
     AXES,
     CENTERS,
@@ -54,6 +58,40 @@ def test_the_covariance_covers_the_error(place):
         error = np.concatenate([rotation.inv().apply(pose[:3] - found.pose[:3]), turn.as_rotvec()])
         nees.append(error @ np.linalg.inv(found.covariance) @ error)
     assert 0.5 < np.mean(nees) < 8.0
+
+
+def test_errors_with_a_long_tail_widen_the_covariance(place):
+    boxes = detections_of(boxes_at(pose_at(-1.8, 1.9, 1.4), noise_px=1.0))
+    wider = replace(place, sensor=replace(place.sensor, tail=2.0 * place.sensor.tail))
+    usual, wide = (dq.locate(one, boxes, LENS) for one in (place, wider))
+    np.testing.assert_array_equal(usual.pose, wide.pose)
+    np.testing.assert_allclose(wide.covariance, 2.0 * usual.covariance, rtol=0.05)
+
+
+def test_an_object_in_many_images_counts_once_for_the_confidence():
+    """By hand: of 8 boxes of 4 objects, half of the margin of 20 over the rival counts."""
+    none = np.zeros(0, dtype=np.int64)
+    places = Places(
+        poses=np.zeros((2, 7)),
+        log_odds=np.array([30.0, 10.0]),
+        covariance=np.zeros((2, 6, 6)),
+        matches=Matches(none, none, none, none),
+        missing=np.zeros(2, dtype=np.int64),
+        log_elsewhere=-50.0,
+    )
+    best, rival = _probabilities(places, 8, 4)
+    assert np.log(best / (1.0 - best)) == pytest.approx(1.3 + 0.36 * 10.0 - 2.3 * np.log(4.0))
+    assert rival == pytest.approx(1.0 - best)
+    once, _ = _probabilities(places, 4, 4)
+    assert np.log(once / (1.0 - once)) == pytest.approx(1.3 + 0.36 * 20.0 - 2.3 * np.log(4.0))
+
+
+def test_boxes_of_two_objects_in_many_images_are_too_few(place):
+    poses = np.array([pose_at(0.3 * k, -2.2, 1.0) for k in range(4)])
+    box = np.concatenate([boxes_at(pose)[:2] for pose in poses])
+    boxes = detections_of(box, NAMES[:2] * 4, pose=np.repeat(np.arange(4), 2))
+    found = dq.locate(place, boxes, LENS, odometry=poses)
+    assert found.reason.startswith("too few: 8 of 8 boxes are of classes in the map")
 
 
 def test_the_answer_moves_with_the_map(place, tmp_path):
@@ -160,6 +198,53 @@ def test_the_right_label_among_several_is_used(place):
     assert found.is_found
     assert apart(found, pose)[0] < 0.01
     np.testing.assert_array_equal(found.object_id, 10 + np.arange(len(NAMES)))
+
+
+def with_other_classes(boxes, names, share):
+    """Give boxes their true classes as second ones, of this share of the confidence."""
+    number = {name: one for one, name in boxes.class_names.items()}
+    other = np.array([number[name] for name in names])
+    other[other == boxes.class_id] = -1
+    score = np.where(other < 0, 0.0, share)
+    return replace(
+        boxes,
+        score=np.full(len(boxes), 1.0 - share),
+        other_class_id=other[:, None],
+        other_score=score[:, None],
+    )
+
+
+def test_other_classes_of_a_box_are_labels_by_their_scores(place):
+    """They answer as the same names with weights, where the first classes alone do not."""
+    pose = pose_at(0.4, 2.4, 1.2)
+    wrong = ("book", "cup", "bowl", "plant", "lamp", "cup", "lamp", "book")
+    first = detections_of(boxes_at(pose), names=wrong)
+    assert not dq.locate(place, first, LENS).is_found
+    found = dq.locate(place, with_other_classes(first, NAMES, 0.45), LENS)
+    labels = [{a: 0.55, b: 0.45} for a, b in zip(wrong, NAMES, strict=True)]
+    by_name = dq.locate(place, first, LENS, labels=labels)
+    assert found.is_found
+    assert apart(found, pose)[0] < 0.01
+    np.testing.assert_allclose(found.pose, by_name.pose, rtol=0.0, atol=2e-3)
+
+
+def test_other_classes_are_those_of_the_box_that_is_kept():
+    """Of two boxes in one place, weights of all classes add up; -1 and a score of 0 are none."""
+    box = np.array([[10.0, 10.0, 50.0, 60.0], [11.0, 10.0, 50.0, 60.0], [80.0, 80.0, 99.0, 99.0]])
+    boxes = dq.Detections(
+        pose=np.zeros(3, dtype=int),
+        box=box,
+        score=np.array([0.5, 0.7, 0.4]),
+        class_id=np.array([0, 1, 2]),
+        object_id=np.full(3, -1),
+        class_names={0: "cup", 1: "bowl", 2: "lamp"},
+        other_class_id=np.array([[1, 2], [2, -1], [0, -1]]),
+        other_score=np.array([[0.2, 0.1], [0.3, 0.9], [0.0, 0.0]]),
+    )
+    labeled = label_boxes(boxes, 0, None)
+    np.testing.assert_array_equal(labeled.row, [1, 2])
+    assert labeled.labels[0] == pytest.approx({"bowl": 0.9, "lamp": 0.4, "cup": 0.5})
+    assert labeled.labels[1] == {"lamp": 0.4}
 
 
 def test_boxes_of_several_classes_in_one_place_are_one(place):

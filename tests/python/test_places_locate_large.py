@@ -6,10 +6,9 @@ from benchmarks.places import rooms
 from scipy.spatial import cKDTree
 
 import dqslam as dq
-from dqslam.places import locate_quick
-from dqslam.places.locate_hypotheses import Hypotheses
-from dqslam.places.locate_map import REACH
-from dqslam.places.locate_pairs import (
+from dqslam.places.location import quick_score
+from dqslam.places.location.hypotheses import Hypotheses
+from dqslam.places.location.pairs import (
     _MOST_COMPARED,
     AGREE,
     AGREE_LARGE,
@@ -19,8 +18,10 @@ from dqslam.places.locate_pairs import (
     agreeing_pairs,
     closed,
     triangles,
+    triples_by_boxes,
     within_budget,
 )
+from dqslam.places.location.place_map import REACH
 
 
 def strewn(random, boxes, objects, extent):
@@ -120,8 +121,8 @@ def test_objects_near_a_hypothesis_score_as_all_do():
     usual = pairings.log_distance.reshape(4, 50)
     assert np.ptp(usual - usual[0], axis=1) == pytest.approx(np.zeros(4), abs=1e-12)
     gain = random.uniform(1.0, 9.0, len(pairings))
-    every = locate_quick._score_all(place, pairings, gain, found)
-    near = locate_quick._score_near(place, pairings, gain, found)
+    every = quick_score._score_all(place, pairings, gain, found)
+    near = quick_score._score_near(place, pairings, gain, found)
     assert every.max() > 1.0
     np.testing.assert_allclose(near, every, rtol=1e-9)
 
@@ -138,6 +139,56 @@ def test_triples_that_most_boxes_close_are_kept():
     kept, strong = closed(pairings, pairs, triples, 10)
     assert set(kept.ravel().tolist()) == set(right.tolist())
     assert set(map(tuple, strong.tolist())) == {tuple(map(int, one)) for one in clique}
+
+
+def paired(counts):
+    """Return pairings of boxes with so many objects each, in order."""
+    box = np.repeat(np.arange(len(counts)), np.array(counts, dtype=np.int64))
+    rows = np.array([row for count in counts for row in range(count)], dtype=np.int64)
+    numbers, rays = np.zeros(len(box)), np.zeros((len(box), 3))
+    return Pairings(box, rows, rays, numbers, numbers, numbers, numbers, rays)
+
+
+def all_pairs(box):
+    """Return the pairs of all pairings of different boxes."""
+    i, j = np.triu_indices(len(box), 1)
+    return np.column_stack([i, j])[box[i] != box[j]]
+
+
+def test_few_triples_of_boxes_are_all_taken():
+    """Each triangle of pairs is one of three boxes, and is found once."""
+    pairings = paired([2, 1, 3, 2])
+    pairs = all_pairs(pairings.box)
+    found = triples_by_boxes(pairings, pairs, 1000)
+    assert len(found) == 2 * 1 * 3 + 2 * 1 * 2 + 2 * 3 * 2 + 1 * 3 * 2
+    assert set(map(tuple, found.tolist())) == set(map(tuple, triangles(pairs, 8).tolist()))
+
+
+def test_triples_of_boxes_with_few_objects_come_first():
+    """Boxes 1 to 3 have two triangles, boxes 0, 1, 3 have three, and the others have six."""
+    pairings = paired([3, 1, 2, 1])
+    pairs = all_pairs(pairings.box)
+    found = triples_by_boxes(pairings, pairs, 2)
+    np.testing.assert_array_equal(pairings.box[found], [[1, 2, 3]] * 2)
+
+
+def test_other_boxes_come_before_those_that_were_taken():
+    pairings = paired([1] * 6)
+    found = triples_by_boxes(pairings, all_pairs(pairings.box), 2)
+    np.testing.assert_array_equal(found, [[0, 1, 2], [3, 4, 5]])
+
+
+def test_of_too_many_triangles_evenly_spaced_ones_are_kept():
+    pairings = paired([20, 20, 20])
+    found = triples_by_boxes(pairings, all_pairs(pairings.box), 100)
+    assert len(found) == 100
+    assert set(found[:, 0].tolist()) == set(range(20))
+
+
+@pytest.mark.parametrize("counts", [[], [3], [2, 2]])
+def test_without_three_boxes_there_is_no_triple(counts):
+    pairings = paired(counts)
+    assert triples_by_boxes(pairings, all_pairs(pairings.box), 100).shape == (0, 3)
 
 
 def test_as_many_objects_as_are_in_reach():

@@ -7,7 +7,7 @@ from matplotlib.colors import to_hex
 import dqslam as dq
 from dqslam._colors import ORANGE, VERMILLION, class_colors
 from dqslam.places.landmarks import read_landmarks
-from dqslam.places.locate_files import ImageLocation
+from dqslam.places.location.files import ImageLocation
 from dqslam.plot.changes import draw_changes
 from dqslam.plot.locations import draw_locations
 from small_place import CENTERS, LENS, NAMES, boxes_at, pose_at, write_map

@@ -62,6 +62,12 @@ def test_the_view_from_above_of_a_street_has_its_length_across():
     np.testing.assert_array_equal(view.points(np.array([[1.0, 2.0, 3.0]])), [[3.0, 1.0]])
 
 
+def test_without_a_path_the_view_from_above_is_along_z():
+    view = from_above(np.zeros((0, 7)))
+    np.testing.assert_array_equal(view.axes, [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    assert (view.labels, view.downward) == (("x [m]", "y [m]"), False)
+
+
 def test_the_view_from_above_of_a_table():
     poses = scenes.orbit_poses()
     poses[:, 0] *= 2.0

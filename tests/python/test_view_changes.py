@@ -9,7 +9,7 @@ import pytest
 import dqslam as dq
 from dqslam.cli import main
 from dqslam.io import FileError
-from dqslam.places.changes_files import write_changes
+from dqslam.places.changes.files import write_changes
 from dqslam.view import build_scene
 from dqslam.view.changes import COLORS, with_changes
 

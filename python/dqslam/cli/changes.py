@@ -54,9 +54,9 @@ def changes(
     """
     from dqslam._outputs import output_set
     from dqslam.cli.results import draw_figure
-    from dqslam.places.alignment import CannotTellError
+    from dqslam.places import CannotTellError
     from dqslam.places.changes import changes as find_changes
-    from dqslam.places.changes_files import described, read_alignment, write_changes
+    from dqslam.places.changes.files import described, read_alignment, write_changes
 
     output = Output(quiet=quiet, as_json=json)
     if one_frame and b_from_a is not None:
@@ -99,7 +99,7 @@ def _table(found: "Changes") -> "Table":
     from rich.markup import escape
     from rich.table import Table
 
-    from dqslam.places.changes_files import distance_and_sigma
+    from dqslam.places.changes.files import distance_and_sigma
 
     table = Table(box=SIMPLE_HEAD)
     for name in ("object", "class", "", "probability", "from, m", "to, m", "moved, m", "looks"):

@@ -14,7 +14,7 @@ from dqslam.cli.settings import ConfigFile
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from dqslam.places.locate_files import ImageLocation
+    from dqslam.places.location.files import ImageLocation
 
 MOST_LISTED = 40
 
@@ -63,7 +63,7 @@ def locate(
     from dqslam import io
     from dqslam._outputs import output_set
     from dqslam.cli.results import draw_figure
-    from dqslam.places.locate_files import described, locate_files, write_locations
+    from dqslam.places.location.files import described, locate_files, write_locations
 
     inputs = (known, *files.files, odometry)
     refuse_shared_input(*inputs[1:])

@@ -187,7 +187,7 @@ def _is_changes(directory: Path) -> bool:
 
 
 def _plot_changes(directory: Path, path: Path, output: Output) -> Path:
-    from dqslam.places.changes_files import read_changes
+    from dqslam.places.changes import read_changes
     from dqslam.plot.changes import plot_changes
 
     found = read_changes(directory / CHANGES_FILE)

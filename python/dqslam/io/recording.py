@@ -184,8 +184,6 @@ def load_recording(
     dropped = replace(dropped, beyond_lens=beyond, below_min_score=dropped.below_min_score - beyond)
     if not rows.size:
         raise FileError(detections, _nothing_left(table, dropped, ids, tolerance, times))
-    classes = dict(zip(table.class_id.tolist(), table.class_name, strict=True))
-    classes = (dict(table.others.class_names) if table.others is not None else {}) | classes
     recording = Recording(
         camera=lens,
         timestamps=times,
@@ -196,14 +194,21 @@ def load_recording(
             score=table.score[rows],
             class_id=table.class_id[rows],
             object_id=object_id[rows],
-            class_names={number: name or str(number) for number, name in classes.items()},
-            **_more_of_boxes(table, rows),
+            class_names=class_names_of(table),
+            **more_of_boxes(table, rows),
         ),
     )
     return (extras or Extras()).added_to(recording, tolerance, whole.timestamps), dropped
 
 
-def _more_of_boxes(table: DetectionTable, rows: NDArray[np.int64]) -> dict[str, Any]:
+def class_names_of(table: DetectionTable) -> dict[int, str]:
+    """Return the names of the classes of boxes and of their other classes; else their numbers."""
+    names = dict(table.others.class_names) if table.others is not None else {}
+    names |= dict(zip(table.class_id.tolist(), table.class_name, strict=True))
+    return {number: name or str(number) for number, name in names.items()}
+
+
+def more_of_boxes(table: DetectionTable, rows: NDArray[np.int64]) -> dict[str, Any]:
     """Return the fields of detections that only some files have."""
     fields: dict[str, Any] = {}
     if table.others is not None:

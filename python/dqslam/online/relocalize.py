@@ -13,9 +13,8 @@ from dqslam.online.maps import MapOfSession
 from dqslam.online.readout import read_objects
 from dqslam.online.state import State
 from dqslam.online.step import StepBoxes
-from dqslam.places.locate import locate
-from dqslam.places.locate_map import PlaceMap
-from dqslam.places.locate_upright import find_up
+from dqslam.places.location import PlaceMap, locate
+from dqslam.places.upright import find_up
 from dqslam.recording import Detections
 
 # The least number of boxes of known objects: it determines the pose.

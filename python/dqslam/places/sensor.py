@@ -50,6 +50,8 @@ class Sensor:
     """Boxes of a low score err more: the logarithm of the variance falls by this per unit of it."""
     usual_score: float
     """Score of boxes whose noise is ``noise``."""
+    tail: float
+    """How many times larger the mean variance of boxes is: ``noise`` is that of most of them."""
     false_boxes: float
     """Mean number of boxes an image that show no object of the map."""
     all_boxes: float
@@ -104,6 +106,7 @@ def assumed_sensor(class_names: tuple[str, ...], sight: float) -> Sensor:
         correlation=0.0,
         score_slope=0.0,
         usual_score=1.0,
+        tail=1.0,
         false_boxes=ASSUMED_FALSE,
         all_boxes=ASSUMED_ALL,
         labels=labels,
@@ -143,12 +146,13 @@ def learn_sensor(
     used = used[:: -(-max(len(used), 1) // 5000)]
     object_in_view = ellipsoids[shown[shown >= 0], :3] - poses[boxes.pose[shown >= 0], :3]
     distance = np.linalg.norm(object_in_view, axis=1)
-    noise, correlation, slope = _learn_noise(camera, poses, boxes, ellipsoids, used, shown)
+    noise, correlation, slope, tail = _learn_noise(camera, poses, boxes, ellipsoids, used, shown)
     return Sensor(
         noise=noise,
         correlation=correlation,
         score_slope=slope,
         usual_score=float(np.mean(boxes.score[used])) if len(used) else 1.0,
+        tail=tail,
         false_boxes=max(float(np.sum(shown < 0)) / count, LEAST_FALSE),
         all_boxes=len(boxes) / count,
         labels=labels,
@@ -214,11 +218,11 @@ def _learn_noise(
     ellipsoids: Floats,
     used: Ints,
     shown: Ints,
-) -> tuple[BoxNoise, float, float]:
+) -> tuple[BoxNoise, float, float, float]:
     """Fit the two parts of the noise to robust variances of edges, by the sides of their boxes.
 
-    Also return the correlation of opposite edges, and by how much the logarithm of the variance
-    falls per unit of the score.
+    Also return the correlation of opposite edges, by how much the logarithm of the variance falls
+    per unit of the score, and how many times larger the mean variance is than the robust one.
     """
     from scipy.optimize import nnls
 
@@ -227,7 +231,7 @@ def _learn_noise(
     )
     used, box = used[front], box[front]
     if len(used) < 50:
-        return BoxNoise(), 0.0, 0.0
+        return BoxNoise(), 0.0, 0.0, 1.0
     measured = boxes.box[used]
     error = (measured - box).ravel()
     side = np.tile(measured[:, 2:] - measured[:, :2], (1, 2)).ravel()
@@ -240,10 +244,11 @@ def _learn_noise(
     parts, _ = nnls(design, variance * weight)
     noise = BoxNoise(pixels=max(float(np.sqrt(parts[0])), 0.5), relative=float(np.sqrt(parts[1])))
     sigma = np.sqrt(np.diagonal(noise.covariance(measured), axis1=1, axis2=2))
+    # Errors of more than three sigmas, as of boxes of other objects, have little weight in a pose.
     whitened = np.clip((measured - box) / sigma, -3.0, 3.0)
     both = float(np.mean(whitened[:, :2] * whitened[:, 2:]) / np.mean(whitened**2))
     slope = _learn_score_slope(whitened, boxes.score[used])
-    return noise, float(np.clip(both, 0.0, 0.8)), slope
+    return noise, float(np.clip(both, 0.0, 0.8)), slope, max(1.0, float(np.mean(whitened**2)))
 
 
 def _learn_score_slope(whitened: Floats, score: Floats) -> float:

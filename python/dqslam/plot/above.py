@@ -1,12 +1,18 @@
 """The view from above of any world, with the longer side of the path across the figure."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dqslam._checks import Floats
 from dqslam.metrics import up_direction
 from dqslam.solids import Solids, flat_outline
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 CIRCLE = np.stack([f(np.linspace(0.0, 2.0 * np.pi, 73)) for f in (np.cos, np.sin)])
 _NAMES = ("x", "y", "z")
@@ -22,6 +28,13 @@ class FromAbove:
     """Labels of the horizontal and the vertical axis of the figure."""
     downward: bool
     """Whether the figure's vertical axis must be inverted to have the numbers of the world."""
+
+    def set_up(self, axes: Axes) -> None:
+        """Label the axes of a map in this view, with one scale for both and a faint grid."""
+        axes.set(aspect="equal", xlabel=self.labels[0], ylabel=self.labels[1])
+        axes.grid(alpha=0.25, linewidth=0.4)
+        if self.downward:
+            axes.invert_yaxis()
 
     def points(self, points: Floats) -> Floats:
         """Return the places (n, 2) of points (n, 3) in the figure, meters."""
@@ -57,8 +70,11 @@ def outline(center: Floats, shape: Floats) -> Floats:
 def from_above(world_from_camera: Floats) -> FromAbove:
     """Choose the view of a path (n, 7).
 
-    If an axis of the world is vertical, the axes of the figure are the other two.
+    If an axis of the world is vertical, the axes of the figure are the other two. Without
+    poses, z is vertical.
     """
+    if not len(world_from_camera):
+        return FromAbove(np.eye(3)[:2], ("x [m]", "y [m]"), downward=False)
     up = up_direction(world_from_camera)
     vertical = int(np.argmax(np.abs(up)))
     if np.abs(up[vertical]) == 1.0:

@@ -5,8 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from dqslam._checks import Floats
 from dqslam.places.changes import STATUSES, Change, Changes
 from dqslam.plot.above import CIRCLE, FromAbove, from_above
@@ -54,14 +52,11 @@ def plot_changes(found: Changes, path: str | Path) -> None:
 
 def draw_changes(found: Changes) -> Figure:
     """Return the figure that ``plot_changes`` writes."""
-    view = _view(found)
+    view = from_above(found.cameras)
     with column_style():
         figure = new_figure(COLUMN_INCHES, COLUMN_INCHES + 0.35)
         axes = figure.subplots()
-        axes.set(aspect="equal", xlabel=view.labels[0], ylabel=view.labels[1])
-        axes.grid(alpha=0.25, linewidth=0.4)
-        if view.downward:
-            axes.invert_yaxis()
+        view.set_up(axes)
         if len(found.cameras):
             axes.plot(*view.points(found.cameras[:, :3]).T, **_LATER_PATH)
         circles = [_draw_object(axes, view, one) for one in found.objects]
@@ -123,11 +118,3 @@ def _draw_legend(figure: Figure, found: Changes) -> None:
     figure.legend(
         handles=entries, loc="outside lower center", ncols=3, frameon=False, borderpad=0.1
     )
-
-
-def _view(found: Changes) -> FromAbove:
-    """Return the view along the vertical of the cameras; along z without cameras."""
-    if len(found.cameras) > 1:
-        return from_above(found.cameras)
-    axes: Floats = np.eye(3)[:2]
-    return FromAbove(axes, ("x [m]", "y [m]"), downward=False)

@@ -9,7 +9,7 @@ import numpy as np
 
 from dqslam._colors import object_colors
 from dqslam.places.landmarks import Landmarks
-from dqslam.places.locate_files import ImageLocation
+from dqslam.places.location.files import ImageLocation
 from dqslam.plot.above import CIRCLE, FromAbove, from_above, outline
 from dqslam.plot.labels import place_labels
 from dqslam.plot.style import (
@@ -54,17 +54,11 @@ def draw_locations(known: Landmarks, answers: list[ImageLocation]) -> Figure:
     transparent. A line is the path of the cameras of the map.
     """
     cameras = np.zeros((0, 7)) if known.results is None else known.results.poses
-    if len(cameras) > 1:
-        view = from_above(cameras)
-    else:
-        view = FromAbove(np.eye(3)[:2], ("x [m]", "y [m]"), downward=False)
+    view = from_above(cameras)
     with column_style():
         figure = new_figure(COLUMN_INCHES, COLUMN_INCHES + 0.35)
         axes = figure.subplots()
-        axes.set(aspect="equal", xlabel=view.labels[0], ylabel=view.labels[1])
-        axes.grid(alpha=0.25, linewidth=0.4)
-        if view.downward:
-            axes.invert_yaxis()
+        view.set_up(axes)
         if len(cameras):
             axes.plot(*view.points(cameras[:, :3]).T, **_MAP_PATH)
         sizes = np.nan_to_num(known.semi_axes.mean(axis=1), nan=_UNKNOWN_SIZE)

@@ -47,12 +47,9 @@ def draw_path_error(truth: MapTruth, positions: Floats, distance: Floats) -> "Fi
         width, height = high - low
         figure = new_figure(COLUMN_INCHES, WIDTH_INCHES * float(height / width) + 0.75)
         axes = figure.subplots()
-        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
-        if view.downward:
-            axes.invert_yaxis()
-        axes.set(xlabel=view.labels[0], ylabel=view.labels[1])
+        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+        view.set_up(axes)
         say_frame(axes, IN_TRUTH)
-        axes.grid(alpha=0.25, linewidth=0.4)
         _, broken_truth = break_at_gaps(truth.timestamps, true_path)
         axes.plot(*broken_truth.T, color=TRUTH, linewidth=0.8, alpha=0.6, label="truth")
         colored = LineCollection(

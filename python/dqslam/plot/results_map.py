@@ -84,11 +84,8 @@ def draw_results_map(results: Results, truth: MapTruth | None = None) -> "Figure
             COLUMN_INCHES, WIDTH_INCHES * float(height / width) + 0.54 + 0.14 * rows
         )
         axes = figure.subplots()
-        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
-        if view.downward:
-            axes.invert_yaxis()
-        axes.set(xlabel=view.labels[0], ylabel=view.labels[1])
-        axes.grid(alpha=0.25, linewidth=0.4)
+        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+        view.set_up(axes)
         say_frame(axes, "from above, in the world of the odometry" if truth is None else IN_TRUTH)
         if truth is not None:
             axes.plot(*_true_path(view, truth).T, gid="truth", **_TRUE_PATH)

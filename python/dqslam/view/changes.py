@@ -11,8 +11,7 @@ import numpy as np
 from dqslam._checks import Floats
 from dqslam._colors import GRAY, GREEN, ORANGE, SKY, VERMILLION
 from dqslam.io.files import FileError
-from dqslam.places.changes import STATUSES, Change
-from dqslam.places.changes_files import read_changes
+from dqslam.places.changes import STATUSES, Change, read_changes
 from dqslam.view.scene import Scene, SceneObject
 
 COLORS = {

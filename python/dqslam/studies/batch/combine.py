@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from dqslam.places import CannotTellError, align, describe_alignment, merge
-from dqslam.places.consensus import MotionName
+from dqslam.places.alignment import MotionName
 
 
 @dataclass(frozen=True)

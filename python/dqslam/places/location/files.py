@@ -13,8 +13,9 @@ from dqslam import _core
 from dqslam import io as files
 from dqslam.io import FileError, Notes, ReadOptions
 from dqslam.io.files import write_text
+from dqslam.io.recording import class_names_of, more_of_boxes
 from dqslam.lens import undistorted_or_nan
-from dqslam.places.locate import Location, locate, place_of
+from dqslam.places.location.location import Location, locate, place_of
 from dqslam.recording import Detections
 
 TABLE = "locations.csv"
@@ -128,14 +129,14 @@ def _read_images(
     if not keep.any():
         raise FileError(path, f"none of {len(table)} boxes has a score of at least {min_score:g}")
     times, image = np.unique(table.timestamp[keep], return_inverse=True)
-    classes = dict(zip(table.class_id.tolist(), table.class_name, strict=True))
     detections = Detections(
         pose=image.reshape(-1),
         box=box[keep],
         score=table.score[keep],
         class_id=table.class_id[keep],
         object_id=np.full(int(keep.sum()), -1),
-        class_names={number: name or str(number) for number, name in classes.items()},
+        class_names=class_names_of(table),
+        **more_of_boxes(table, np.flatnonzero(keep)),
     )
     return times, detections
 

@@ -8,9 +8,9 @@ import numpy as np
 
 from dqslam import _core
 from dqslam._checks import Floats, Ints
+from dqslam.places.alignment.likelihood import log_student, tangent
+from dqslam.places.alignment.rigid import MotionModel, Motions
 from dqslam.places.landmarks import Landmarks
-from dqslam.places.likelihood import log_student, tangent
-from dqslam.places.rigid import MotionModel, Motions
 
 FREEDOMS = (1.0, 2.0, 4.0, 16.0)
 """Degrees of freedom that are tried: from Cauchy's distribution to nearly the normal one."""

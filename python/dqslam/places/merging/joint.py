@@ -10,10 +10,10 @@ from dqslam import _core
 from dqslam._checks import Bools, Floats, Ints
 from dqslam.estimate import Estimate
 from dqslam.graph import Graph, solve
-from dqslam.places.alignment import Alignment
-from dqslam.places.consensus import MotionName, align
-from dqslam.places.joint_tables import joined_tables, moved_ellipsoids, moved_poses, pose_of
+from dqslam.places.alignment.consensus import MotionName, align
+from dqslam.places.alignment.result import Alignment
 from dqslam.places.landmarks import landmarks_of
+from dqslam.places.merging.tables import joined_tables, moved_ellipsoids, moved_poses, pose_of
 from dqslam.subgraph import only_objects
 from dqslam.uncertainty import Marginals, marginal_covariances
 

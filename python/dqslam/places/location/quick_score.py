@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from dqslam._checks import Bools, Floats
-from dqslam.places.locate_hypotheses import Hypotheses
-from dqslam.places.locate_map import AHEAD, MOST_OBJECTS, ImageBoxes, PlaceMap
-from dqslam.places.locate_pairs import Pairings
+from dqslam.places.location.hypotheses import Hypotheses
+from dqslam.places.location.pairs import Pairings
+from dqslam.places.location.place_map import AHEAD, MOST_OBJECTS, ImageBoxes, PlaceMap
 
 # Sigma of the direction of a box's middle: constant [rad], and a share of its half side.
 _RAY_SIGMA, _RAY_SHARE = 0.015, 0.25

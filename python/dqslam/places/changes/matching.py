@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dqslam._checks import Floats, Ints
-from dqslam.places.changes_map import SeenMap, missed
-from dqslam.places.changes_sizes import SizeErrors, learned_errors, log_size_ratio, usual_errors
+from dqslam.places.changes.seen_map import SeenMap, missed
+from dqslam.places.changes.sizes import SizeErrors, learned_errors, log_size_ratio, usual_errors
 
 # Prior probabilities: an object stays, moves, vanishes; one of the second map is new.
 STAYS, MOVES, VANISHES, APPEARS = 0.7, 0.1, 0.1, 0.1

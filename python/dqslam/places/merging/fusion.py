@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dqslam._checks import Floats, Ints
-from dqslam.places.alignment import Alignment
+from dqslam.places.alignment.likelihood import tangent
+from dqslam.places.alignment.refine import Refined, common_motion
+from dqslam.places.alignment.result import Alignment
+from dqslam.places.alignment.rigid import MotionModel
 from dqslam.places.landmarks import Landmarks
-from dqslam.places.likelihood import tangent
-from dqslam.places.refine import Refined, common_motion
-from dqslam.places.rigid import MotionModel
 
 _SPACE = MotionModel(upright=False, has_scale=False)
 # Least share of a variance that stays with an object itself, once the motion of all is taken out.

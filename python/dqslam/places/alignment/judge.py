@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from dqslam._checks import Bools, Floats, Ints
-from dqslam.places.likelihood import (
+from dqslam.places.alignment.likelihood import (
     SPREADS,
     Objects,
     Target,
@@ -24,7 +24,7 @@ from dqslam.places.likelihood import (
     log_student,
     tangent,
 )
-from dqslam.places.rigid import MotionModel, Motions
+from dqslam.places.alignment.rigid import MotionModel, Motions
 
 _ROUNDS = 6
 _REACH = 3.5  # sigmas of the widest spread within which a partner is looked for

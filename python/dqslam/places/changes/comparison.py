@@ -14,9 +14,9 @@ from dqslam._checks import Floats, as_covariances, as_floats
 from dqslam._repr import counted
 from dqslam.io import Results
 from dqslam.io.results import load_map_results
-from dqslam.places.changes_frames import find_frame, frame_covariance
-from dqslam.places.changes_map import SeenMap
-from dqslam.places.changes_match import CENTER_M, CENTER_SHARE, Assignment, match_maps
+from dqslam.places.changes.frames import find_frame, frame_covariance
+from dqslam.places.changes.matching import CENTER_M, CENTER_SHARE, Assignment, match_maps
+from dqslam.places.changes.seen_map import SeenMap
 
 Status = Literal["stayed", "moved", "vanished", "appeared", "unknown"]
 STATUSES: tuple[Status, ...] = ("stayed", "moved", "vanished", "appeared", "unknown")

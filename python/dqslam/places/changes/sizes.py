@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dqslam._checks import Floats, Ints
-from dqslam.places.changes_map import SeenMap
+from dqslam.places.changes.seen_map import SeenMap
 
 # From the logarithms of descending semi-axes: size, length, flatness.
 PARTS = np.array([[1.0, 1.0, 1.0], [1.0, 0.0, -1.0], [1.0, -2.0, 1.0]])

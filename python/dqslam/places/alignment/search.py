@@ -11,15 +11,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from dqslam._checks import Floats, Ints
-from dqslam.places.likelihood import Objects, Target, log_densities
-from dqslam.places.rigid import MotionModel, Motions
-from dqslam.places.triangles import find_triangles, match_triangles
+from dqslam.places.alignment.likelihood import Objects, Target, log_densities
+from dqslam.places.alignment.rigid import MotionModel, Motions
+from dqslam.places.alignment.triangles import find_triangles, match_triangles
 
 _TRIANGLES = 150_000  # of a map
 _MATCHES = 3_000_000  # of triangles
 _FIRST = 20_000  # motions that are judged
 _FIRST_NEIGHBORS = 12
-_WORK = 400_000  # places that are looked up at a time
+_WORK = 100_000  # places that are looked up at a time
 _FEWEST = 24  # motions that are judged by the whole maps
 _MOST = 120
 # Sides agree within three sigmas of the error of one center: that is 1.5 of the difference.
@@ -50,10 +50,11 @@ def search(a: Objects, target: Target, model: MotionModel, sigma: float) -> Cand
         near = np.atleast_2d(tree.query(a.centers[anchor, : model.axes], k=count)[1])
         near = near.reshape(len(found), count)
         for _ in range(2):
-            found, score = _improve(a, target, model, sigma, found, near)
+            found, score, partner = _improve(a, target, model, sigma, found, near)
         kept = _distinct(a, found, np.argsort(-score, kind="stable"), sigma)
         if count == len(a):
-            return Candidates(found[kept[:_MOST]], anchor[kept[:_MOST]])
+            kept = kept[_different(partner[kept], _MOST)]
+            return Candidates(found[kept], anchor[kept])
         count = min(3 * count, len(a))
         kept = kept[: int(np.clip(_WORK / count, _FEWEST, _FIRST))]
         found, anchor = found[kept], anchor[kept]
@@ -103,8 +104,12 @@ def _most_voted(motions: Motions, anchor_a: Ints, anchor_b: Ints, count_b: int) 
 
 def _improve(
     a: Objects, target: Target, model: MotionModel, sigma: float, motions: Motions, near: Ints
-) -> tuple[Motions, Floats]:
-    """Fit each motion to the objects (m, n) of A that have a partner; return scores, too."""
+) -> tuple[Motions, Floats, Ints]:
+    """Fit each motion to the objects (m, n) of A that have a partner in B.
+
+    Also return the scores (m,) of the motions before, and the rows (m, n) of their partners that
+    are more likely right than wrong, else -1.
+    """
     variance = (_FIRST_SIGMA * sigma) ** 2
     moved = motions.apply(a.centers[near])
     distance, row = target.nearest(moved, a.labels[near], 3.0 * _FIRST_SIGMA * sigma)
@@ -116,7 +121,8 @@ def _improve(
     score = np.log1p(_SHARE * (ratio - 1.0)).sum(axis=1)
     weight = _SHARE * ratio / (1.0 - _SHARE + _SHARE * ratio)
     fitted = model.fit(a.centers[near], target.objects.centers[row], weight)
-    enough = (weight > 0.5).sum(axis=1) >= 3
+    likely = weight > 0.5
+    enough = likely.sum(axis=1) >= 3
     keep = [
         np.where(enough.reshape(-1, *(1,) * (old.ndim - 1)), new, old)
         for new, old in (
@@ -125,7 +131,7 @@ def _improve(
             (fitted.scale, motions.scale),
         )
     ]
-    return Motions(*keep), score
+    return Motions(*keep), score, np.where(likely, row, -1)
 
 
 def _distinct(a: Objects, motions: Motions, order: Ints, grid: float) -> Ints:
@@ -135,3 +141,20 @@ def _distinct(a: Objects, motions: Motions, order: Ints, grid: float) -> Ints:
     cell = np.column_stack([place, np.floor(motions.rotation[:, :, 0] * 50.0)])[order]
     _, first = np.unique(cell, axis=0, return_index=True)
     return np.asarray(order[np.sort(first)])
+
+
+def _different(partner: Ints, most: int) -> Ints:
+    """Return the first rows (k,), at most so many, that pair objects differently: (m, n) of B.
+
+    Motions that share more than half of the pairs of an earlier one would be fitted to the same.
+    """
+    left = np.ones(len(partner), dtype=np.bool_)
+    chosen: list[int] = []
+    for row, own in enumerate(partner):
+        if not left[row] or len(chosen) == most:
+            continue
+        chosen.append(row)
+        paired = own >= 0
+        shared = (partner[:, paired] == own[paired]).sum(axis=1)
+        left &= 2 * shared <= paired.sum()
+    return np.array(chosen, dtype=np.int64)

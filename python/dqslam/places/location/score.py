@@ -14,7 +14,7 @@ import numpy as np
 
 from dqslam import _core
 from dqslam._checks import Bools, Floats, Ints
-from dqslam.places.locate_map import AHEAD, MOST_OBJECTS, ImageBoxes, PlaceMap
+from dqslam.places.location.place_map import AHEAD, MOST_OBJECTS, ImageBoxes, PlaceMap
 from dqslam.places.visibility import view_objects
 
 SE3 = _core.PoseModel.SE3

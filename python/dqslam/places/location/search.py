@@ -8,11 +8,11 @@ import numpy as np
 
 from dqslam import _core
 from dqslam._checks import Bools, Floats, Ints
-from dqslam.places.locate_hypotheses import Hypotheses, find_hypotheses
-from dqslam.places.locate_map import MOST_OBJECTS, PlaceMap
-from dqslam.places.locate_pairs import pair_up
-from dqslam.places.locate_quick import quick_score
-from dqslam.places.locate_score import SE3, Frame, Matches, Scored, Scorer
+from dqslam.places.location.hypotheses import Hypotheses, find_hypotheses
+from dqslam.places.location.pairs import pair_up
+from dqslam.places.location.place_map import MOST_OBJECTS, PlaceMap
+from dqslam.places.location.quick_score import quick_score
+from dqslam.places.location.score import SE3, Frame, Matches, Scored, Scorer
 
 # Hypotheses of each image that are compared with its boxes quickly, in a small and in a large map,
 # and scored.
@@ -89,7 +89,7 @@ def _weigh(place: PlaceMap, scorer: Scorer, scored: Scored, elsewhere: float) ->
     joined, covariance = _join(
         scored.poses,
         log_odds,
-        np.asarray(np.linalg.inv(information), dtype=np.float64),
+        np.asarray(place.sensor.tail * np.linalg.inv(information), dtype=np.float64),
         best,
         sight,
     )

@@ -8,13 +8,21 @@ import numpy as np
 
 from dqslam._checks import Floats, Ints
 from dqslam._repr import counted
-from dqslam.places.alignment import Alignment, CannotTellError, Rival
-from dqslam.places.judge import CHANCE, Hypothesis, doubt, judge, lead, match_again
+from dqslam.places.alignment.judge import (
+    CHANCE,
+    RIVAL,
+    Hypothesis,
+    doubt,
+    judge,
+    lead,
+    match_again,
+)
+from dqslam.places.alignment.likelihood import Objects, Target, spacing
+from dqslam.places.alignment.refine import Refined, refine
+from dqslam.places.alignment.result import Alignment, CannotTellError, Rival
+from dqslam.places.alignment.rigid import MotionModel, Motions
+from dqslam.places.alignment.search import search
 from dqslam.places.landmarks import Landmarks, Source, read_landmarks
-from dqslam.places.likelihood import Objects, Target, spacing
-from dqslam.places.refine import Refined, refine
-from dqslam.places.rigid import MotionModel, Motions
-from dqslam.places.search import search
 
 MotionName = Literal["auto", "se2", "se3"]
 # Centers of unknown uncertainty are assumed to be known to this share of the room of an object.
@@ -23,6 +31,9 @@ SIGMA_OF_SPACING = 1.0 / 20.0
 _SIZE_SIGMA, _LEAST_SIZE_SIGMA = 0.2, 0.1
 _FEWEST = 3
 _GROWTHS = 10
+# Upright motions with less evidence are compared with tilted ones, by more than this turn [rad]:
+# objects of one height lie in the mirrored order where a map is upside down, and some may agree.
+_SURE, _TILTED = 50.0, 0.2
 
 
 def align(
@@ -42,7 +53,8 @@ def align(
     Parameters
     ----------
     motion
-        ``se2`` if both maps have z up, else ``se3``. By default, ``se2`` is tried first.
+        ``se2`` if both maps have z up, else ``se3``. By default, ``se2`` is tried first, and
+        ``se3`` if it says little or nothing: the answer with clearly more evidence is taken.
     scale
         Whether the units of length may differ, as of maps from images alone.
     sigma
@@ -85,12 +97,20 @@ def align_landmarks(
     if motion != "auto":
         return _align(a, b, common, MotionModel(motion == "se2", scale), sigma)
     try:
-        return _align(a, b, common, MotionModel(True, scale), sigma)
+        upright = _align(a, b, common, MotionModel(True, scale), sigma)
     except _TooFewError as error:
         try:
             return _align(a, b, common, MotionModel(False, scale), sigma)
         except CannotTellError:
             raise CannotTellError(str(error)) from None
+    if upright[0].evidence > _SURE:
+        return upright
+    try:
+        free = _align(a, b, common, MotionModel(False, scale), sigma)
+    except CannotTellError:
+        return upright
+    is_tilted = free[0].b_from_a[2, 2] < free[0].scale * np.cos(_TILTED)
+    return free if is_tilted and free[0].evidence > upright[0].evidence + RIVAL else upright
 
 
 class _TooFewError(CannotTellError):

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dqslam._checks import Bools, Floats, Ints
-from dqslam.places.rigid import MotionModel
+from dqslam.places.alignment.rigid import MotionModel
 
 SHARES = np.array([0.1, 0.3, 0.6, 0.9])
 """Shares of the objects of one map, where the other map is, that the other has, too."""

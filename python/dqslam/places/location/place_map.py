@@ -16,9 +16,9 @@ from dqslam.io.results import ellipsoid_covariances
 from dqslam.io.results.map_covariances import UNKNOWN_LOG_SIGMA
 from dqslam.lens import cut_edges
 from dqslam.places.landmarks import Landmarks
-from dqslam.places.locate_boxes import LabeledBoxes
-from dqslam.places.locate_upright import Upright, find_up
+from dqslam.places.location.boxes import LabeledBoxes
 from dqslam.places.sensor import Sensor, assumed_sensor, learn_sensor
+from dqslam.places.upright import Upright, find_up
 
 # Sight in a map without boxes, in mean sizes of its objects.
 _ASSUMED_SIGHT = 40.0

@@ -35,7 +35,8 @@ def label_boxes(
 ) -> LabeledBoxes:
     """Take the boxes of the image at a pose, and join those that are one with several labels.
 
-    ``labels`` (m,) are the weights of labels of all detections; by default, the class of each.
+    ``labels`` (m,) are the weights of labels of all detections; by default, the class of each and
+    the other classes that the detector thinks possible, by their confidences.
     """
     rows = np.flatnonzero(detections.pose == pose)
     rows = rows[np.argsort(-detections.score[rows], kind="stable")]
@@ -104,8 +105,15 @@ def check_labels(labels: Sequence[Mapping[str, float]], count: int) -> None:
 
 
 def _labels(detections: Detections, row: int) -> dict[str, float]:
+    """Return the confidences of the detector in the class of a box and in its other classes."""
     name = detections.class_names[int(detections.class_id[row])]
-    return {name: max(float(detections.score[row]), 1e-3)}
+    found = {name: max(float(detections.score[row]), 1e-3)}
+    others = detections.other_class_id[row].tolist(), detections.other_score[row].tolist()
+    for number, score in zip(*others, strict=True):
+        if number >= 0 and score > 0.0:
+            other = detections.class_names[number]
+            found[other] = found.get(other, 0.0) + score
+    return found
 
 
 def _iou(boxes: Floats, box: Floats) -> Floats:

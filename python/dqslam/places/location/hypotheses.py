@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dqslam._checks import Bools, Floats, Ints
-from dqslam.places.locate_pairs import (
+from dqslam.places.location.pairs import (
     AGREE,
     AGREE_LARGE,
     Pairings,
@@ -22,7 +22,7 @@ from dqslam.places.locate_pairs import (
     triples_by_boxes,
     within_budget,
 )
-from dqslam.places.locate_upright import Upright
+from dqslam.places.upright import Upright
 
 # Boxes, at most, that hypotheses set out from.
 _MOST_BOXES = 10

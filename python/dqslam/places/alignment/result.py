@@ -9,7 +9,7 @@ import numpy as np
 
 from dqslam._checks import Floats, Ints
 from dqslam._repr import counted
-from dqslam.places.judge import CHANCE, RIVAL
+from dqslam.places.alignment.judge import CHANCE, RIVAL
 
 ALIGNMENT_FILE = "alignment.json"
 

@@ -16,20 +16,21 @@ from dqslam.io import Results
 from dqslam.io.results import load_map_results
 from dqslam.lens import camera_with, lens_of
 from dqslam.places.landmarks import read_landmarks
-from dqslam.places.locate_boxes import LabeledBoxes, check_labels, label_boxes, labels_of_array
-from dqslam.places.locate_map import ImageBoxes, PlaceMap
-from dqslam.places.locate_score import SE3, Frame
-from dqslam.places.locate_search import Places, find_places
+from dqslam.places.location.boxes import LabeledBoxes, check_labels, label_boxes, labels_of_array
+from dqslam.places.location.place_map import ImageBoxes, PlaceMap
+from dqslam.places.location.score import SE3, Frame
+from dqslam.places.location.search import Places, find_places
 from dqslam.recording import Detections
 
 # A model of independent errors is too sure of itself, and the more so the more boxes it takes for
-# independent: of its log-odds m with k matches, offset + slope * m - by_match * ln k is right, as
-# counted in simulated places (docs/locate.md).
-CALIBRATED_OFFSET, CALIBRATED_SLOPE, CALIBRATED_BY_MATCH = 1.3, 0.36, 2.3
+# independent: of its log-odds m with k objects, offset + slope * m - by_object * ln k is right, as
+# counted in simulated places (docs/locate.md). An object that fits a wrong pose by chance does so
+# in all images of a sequence: its boxes count as one, by their mean.
+CALIBRATED_OFFSET, CALIBRATED_SLOPE, CALIBRATED_BY_OBJECT = 1.3, 0.36, 2.3
 # Images of a sequence that vote, at most: those with the most boxes.
 MOST_IMAGES = 12
-# An image of fewer boxes is left out; a pose of fewer matches is no answer.
-FEWEST_BOXES, FEWEST_MATCHES = 2, 3
+# An image of fewer boxes is left out; a pose of fewer objects is no answer.
+FEWEST_BOXES, FEWEST_OBJECTS = 2, 3
 # The largest sigma of a position that is an answer, as a share of the distance of sight.
 MOST_SIGMA = 0.06
 
@@ -111,14 +112,15 @@ def locate(
         The map: results, their folder, a ``map.json`` or CSV of objects with sizes, or
         ``PlaceMap.of(results)``, which saves time if many images are located.
     boxes
-        Boxes in undistorted pixels. Ids of objects are not used. Boxes of different classes that
-        overlap by an intersection over union of 0.8 count as one box with several labels.
+        Boxes in undistorted pixels. Ids of objects are not used. A box may be of its other classes,
+        too, in proportion to their scores. Boxes of different classes that overlap by an
+        intersection over union of 0.8 count as one box with several labels.
     camera
         The camera of the image, which may differ from the map's. Its mount is ignored.
     labels
-        What each box may be instead of its class: names of classes with weights, shape (m,), or an
-        array of probabilities, shape (m, c), whose columns are the classes of
-        ``boxes.class_names`` by their numbers.
+        What each box may be instead of its classes: names with weights, shape (m,), or an array of
+        probabilities, shape (m, c), whose columns are the classes of ``boxes.class_names`` by their
+        numbers.
     odometry
         Poses of the camera in a frame of its own, world_from_camera, shape (n, 7), if the boxes are
         of several images: ``boxes.pose`` are rows of it.
@@ -231,28 +233,32 @@ def _answer(
         strict=True,
     ):
         shown[labeled[frame].row[box]] = place.object_ids[row]
-    matches = int(first.sum())
+    matches, objects = int(first.sum()), len(np.unique(places.matches.object_row[first]))
     candidates = tuple(
         Candidate(pose, covariance, probability)
         for pose, covariance, probability in zip(
-            places.poses, places.covariance, _probabilities(places, matches), strict=True
+            places.poses,
+            places.covariance,
+            _probabilities(places, matches, objects),
+            strict=True,
         )
     )
-    reason = _reason(place, candidates, places, labeled, matches, min_confidence)
+    reason = _reason(place, candidates, places, labeled, objects, min_confidence)
     return Location(reason, candidates, shown, image)
 
 
-def _probabilities(places: Places, matches: int) -> list[float]:
+def _probabilities(places: Places, matches: int, objects: int) -> list[float]:
     """Return the calibrated probability of each place; the rest is that of no place of these.
 
-    The best one has so many matches.
+    At the best one, so many boxes show so many objects.
     """
     if not len(places.log_odds):
         return []
     every = np.append(places.log_odds, places.log_elsewhere)
     others = np.logaddexp.reduce(every[1:])
-    log_odds = CALIBRATED_OFFSET + CALIBRATED_SLOPE * (every[0] - others)
-    log_odds -= CALIBRATED_BY_MATCH * np.log(max(matches, 1))
+    margin = (every[0] - others) * objects / max(matches, 1)
+    log_odds = CALIBRATED_OFFSET + CALIBRATED_SLOPE * margin
+    log_odds -= CALIBRATED_BY_OBJECT * np.log(max(objects, 1))
     best = float(1.0 / (1.0 + np.exp(-log_odds)))
     # A rival is at most as probable as the best one.
     rivals = np.minimum(np.exp(every[1:-1] - others) * (1.0 - best), best)
@@ -264,7 +270,7 @@ def _reason(
     candidates: tuple[Candidate, ...],
     places: Places,
     labeled: list[LabeledBoxes],
-    matches: int,
+    objects: int,
     min_confidence: float,
 ) -> str:
     """Say why there is no answer, or nothing if there is one."""
@@ -280,8 +286,8 @@ def _reason(
     if not candidates:
         return f"too few: {counted}, and no three agree about a pose"
     best = candidates[0]
-    if matches < FEWEST_MATCHES:
-        return f"too few: {counted}, and {matches} show objects at the best pose"
+    if objects < FEWEST_OBJECTS:
+        return f"too few: {counted}, and {objects} show objects at the best pose"
     if best.probability < min_confidence:
         rivals = np.logaddexp.reduce(places.log_odds[1:], initial=-np.inf)
         if rivals > places.log_elsewhere:

@@ -13,9 +13,9 @@ from dqslam.graph import Graph
 from dqslam.io.results import GRAPH_FILE, read_graph
 from dqslam.io.results.covariances import motion_of_camera
 from dqslam.lens import camera_with
-from dqslam.places.alignment import Alignment
-from dqslam.places.joint import JointMap, solve_together, why_apart
+from dqslam.places.alignment.result import Alignment
 from dqslam.places.landmarks import Landmarks, landmarks_of
+from dqslam.places.merging.joint import JointMap, solve_together, why_apart
 
 _SE3 = _core.PoseModel.SE3
 

@@ -14,12 +14,12 @@ from dqslam._files import write_text
 from dqslam._outputs import output_set
 from dqslam._repr import counted
 from dqslam.io.results import Results
-from dqslam.places.alignment import Alignment, CannotTellError
-from dqslam.places.consensus import MotionName, align_landmarks
-from dqslam.places.fusion import Fused, fuse
+from dqslam.places.alignment.consensus import MotionName, align_landmarks
+from dqslam.places.alignment.result import Alignment, CannotTellError
 from dqslam.places.landmarks import Landmarks, Source, read_landmarks
-from dqslam.places.merged_files import write_merged
-from dqslam.places.together import (
+from dqslam.places.merging.files import write_merged
+from dqslam.places.merging.fusion import Fused, fuse
+from dqslam.places.merging.together import (
     Paths,
     Solved,
     joined_ids,

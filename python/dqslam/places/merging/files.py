@@ -22,13 +22,13 @@ from dqslam.io.results import GRAPH_FILE, Results, write_graph
 from dqslam.io.results.boxes import COLUMNS, EDGES
 from dqslam.io.results.covariances import write_rows
 from dqslam.io.trajectory import write_trajectory
-from dqslam.places.alignment import describe_alignment
-from dqslam.places.joint import time_shift
+from dqslam.places.alignment.result import describe_alignment
+from dqslam.places.merging.joint import time_shift
 
 if TYPE_CHECKING:
     from dqslam._checks import Floats
-    from dqslam.places.joining import MergedMap, Part
     from dqslam.places.landmarks import Landmarks
+    from dqslam.places.merging.joining import MergedMap, Part
 
 MERGE_FILE = "merge.json"
 

@@ -6,10 +6,10 @@ import numpy as np
 
 from dqslam._checks import Floats
 from dqslam.io import Results
-from dqslam.places.alignment import CannotTellError
-from dqslam.places.changes_map import SeenMap
-from dqslam.places.consensus import align
-from dqslam.places.judge import CHANCE
+from dqslam.places.alignment.consensus import align
+from dqslam.places.alignment.judge import CHANCE
+from dqslam.places.alignment.result import CannotTellError
+from dqslam.places.changes.seen_map import SeenMap
 
 # Error of the frames of two maps that are said to have one: meters and radians.
 FRAME_SIGMA_M, FRAME_SIGMA_RAD = 0.05, 0.02

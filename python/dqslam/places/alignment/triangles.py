@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dqslam._checks import Floats, Ints
-from dqslam.places.rigid import MotionModel
+from dqslam.places.alignment.rigid import MotionModel
 
 # Sides of a triangle that are shorter than this many sigmas determine no direction.
 _SHORTEST_SIDE = 4.0

@@ -11,8 +11,8 @@ from dqslam import _core
 from dqslam._checks import Bools, Floats, Ints
 from dqslam.io import MapObjects, Results
 from dqslam.io.results import ellipsoid_covariances
-from dqslam.places.locate_upright import find_up
 from dqslam.places.sensor import Sensor, learn_sensor
+from dqslam.places.upright import find_up
 from dqslam.places.visibility import view_objects
 
 # Objects with fewer boxes than this do not enter a map.

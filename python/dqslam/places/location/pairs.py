@@ -14,7 +14,7 @@ import numpy as np
 
 from dqslam import _core
 from dqslam._checks import Bools, Floats, Ints
-from dqslam.places.locate_map import ImageBoxes, PlaceMap
+from dqslam.places.location.place_map import ImageBoxes, PlaceMap
 
 # The least probability of labels for an object among the hypotheses, relative to the best object.
 _LEAST_LABEL = 0.1

@@ -10,8 +10,8 @@ import numpy as np
 
 from dqslam._checks import Floats, as_covariances, as_floats
 from dqslam.io.files import FileError, read_text, write_json, write_text
-from dqslam.places.changes import STATUSES, Change, Changes
-from dqslam.places.changes_frames import covariance_in_b
+from dqslam.places.changes.comparison import STATUSES, Change, Changes
+from dqslam.places.changes.frames import covariance_in_b
 
 _COLUMNS = (
     *("status", "probability", "first_id", "second_id", "class_name"),
