@@ -34,7 +34,7 @@ def align_real(
 ) -> None:
     """Align published maps of one place, turned and shifted at random."""
     say = _printer()
-    say("| maps | | right | turn [deg] | shift [m] |\n|---|---|---|---|---|")
+    say("| maps | | off the reference | turn [deg] | shift [m] |\n|---|---|---|---|---|")
     for place in real.PLACES:
         for row in real.rows(place, trials):
             say(row)

@@ -90,7 +90,7 @@ def test_derivatives_by_cameras_that_the_ground_follows_are_small_differences(mo
         step = (e * np.eye(6 * COUNT)[place]).reshape(-1, 6)
         costs = [linearize(problem.moved(s * step), at, moves, first).cost for s in (1, -1)]
         expected = (costs[0] - costs[1]) / (2 * e)
-        found = equations.gradient_camera.ravel()[place]
+        found = equations.cameras.gradient.ravel()[place]
         assert found == pytest.approx(expected, rel=1e-3, abs=0.05)
 
 
@@ -169,7 +169,7 @@ def test_the_evidence_of_a_path_that_errs_a_little_is_that_of_a_normal():
     problem, truth = oncoming(noise_px=0.5)
     fit = fit_track(problem, truth, MOVES)
     size, e = 6 * COUNT, 1e-4
-    gradient = fit.equations.gradient_camera.ravel()
+    gradient = fit.equations.cameras.gradient.ravel()
     one = np.zeros(size)
     one[[0, 6, 13]] = 1.0, -0.5, 0.7
     path = 1e-4 * np.outer(one, one)  # all cameras move by one random number

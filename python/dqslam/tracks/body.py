@@ -9,6 +9,7 @@ at a car, whose corners are round, and an estimate does not get caught at the ki
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -55,8 +56,16 @@ class PredictedBoxes:
     """By foot [m] and heading [rad], shape (n, 4, 4)."""
     by_size: Floats
     """By the logarithms of half the length, width and height, shape (n, 4, 3)."""
-    by_camera: Floats
-    """By small motions of the camera in its own frame [m, rad], shape (n, 4, 6)."""
+    _seen: Floats
+    """The corners in the frames of the cameras, meters, shape (n, 8, 3)."""
+    _by_seen: Floats
+    """By these, shape (n, 4, 8, 3)."""
+
+    @cached_property
+    def by_camera(self) -> Floats:
+        """By small motions of the camera in its own frame [m, rad], shape (n, 4, 6)."""
+        by_turn = np.cross(self._by_seen, -self._seen[:, None]).sum(axis=2)
+        return np.concatenate([-self._by_seen.sum(axis=2), -by_turn], axis=2)
 
 
 def predict_boxes(
@@ -112,8 +121,7 @@ def predict_boxes(
         ],
         axis=2,
     )
-    by_turn = np.cross(by_seen, -seen[:, None]).sum(axis=2)
-    by_foot, by_shift = by_point.sum(axis=2), by_seen.sum(axis=2)
+    by_foot = by_point.sum(axis=2)
     box[~in_front] = np.nan
     return PredictedBoxes(
         box,
@@ -122,5 +130,6 @@ def predict_boxes(
         pixel[rows, corner],
         np.concatenate([by_foot, by_heading[..., None]], axis=2),
         by_size,
-        np.concatenate([-by_shift, -by_turn], axis=2),
+        seen,
+        by_seen,
     )

@@ -47,7 +47,7 @@ class _Factor:
         What rests is bound so stiffly from image to image that a share of the whole diagonal would
         keep it where it is.
         """
-        from scipy.linalg import cholesky_banded
+        from scipy.linalg.lapack import dpbtrf  # thousands of small ones: no wrapper
 
         count = len(equations.diagonal)
         band = np.zeros((2 * SIZE, SIZE * count))
@@ -58,7 +58,10 @@ class _Factor:
         place = np.arange(count - 1)[:, None] * SIZE + columns
         band[SIZE + rows - columns, place] = equations.below[:, rows, columns]
         band[0] += damping * equations.of_boxes.ravel()
-        self._chain: Floats = cholesky_banded(band, lower=True, check_finite=False)
+        chain, failed_at = dpbtrf(band, lower=1, overwrite_ab=1)
+        if failed_at:
+            raise np.linalg.LinAlgError(f"the chain is not positive definite at {failed_at}")
+        self._chain: Floats = chain
         self._border = equations.border.reshape(-1, 3)
         self._reduced = self._solve_chain(self._border)
         corner = equations.corner + damping * np.diag(np.diag(equations.corner))
@@ -72,9 +75,9 @@ class _Factor:
         return chain - self._reduced @ of_size, of_size
 
     def _solve_chain(self, right: Floats) -> Floats:
-        from scipy.linalg import cho_solve_banded
+        from scipy.linalg.lapack import dpbtrs
 
-        return np.asarray(cho_solve_banded((self._chain, True), right, check_finite=False))
+        return np.asarray(dpbtrs(self._chain, right, lower=1)[0])
 
     @property
     def log_determinant(self) -> float:
@@ -197,7 +200,7 @@ def _move_path(
     cost = fit.equations.cost + 0.5 * float(motion @ force)
     for _ in range(_PATH_ROUNDS):
         information = _information_of_cameras(at)
-        pull = information @ motion - at.equations.gradient_camera.ravel()
+        pull = information @ motion - at.equations.cameras.gradient.ravel()
         both = np.eye(len(force)) + path @ information
         step = np.linalg.solve(both, path @ pull) - motion
         change = pull - information @ (motion + step) - force
@@ -222,10 +225,10 @@ def _information_of_cameras(fit: TrackFit) -> Floats:
     information = -coupling.T @ np.vstack(
         _Factor(fit.equations).solve(coupling[:-3], coupling[-3:])
     )
-    for row, own in enumerate(fit.equations.of_camera):
+    for row, own in enumerate(fit.equations.cameras.of_camera):
         place = slice(6 * row, 6 * row + 6)
         information[place, place] += own
-    for row, own in enumerate(fit.equations.rest_by_camera):
+    for row, own in enumerate(fit.equations.cameras.rest_by_camera):
         place = slice(6 * row, 6 * row + 12)
         information[place, place] += np.outer(own, own)
     return np.asarray(information)
@@ -248,13 +251,13 @@ def covariance(fit: TrackFit) -> tuple[Floats, Floats]:
 
 def _coupling(equations: Equations) -> Floats:
     """Return the second derivatives by states and size, and motions of cameras, (6 n + 3, 6 n)."""
-    count = len(equations.diagonal)
+    count, cameras = len(equations.diagonal), equations.cameras
     coupling = np.zeros((SIZE * count + 3, 6 * count))
     for row in range(count):
         columns = slice(6 * row, 6 * row + 6)
-        coupling[SIZE * row : SIZE * row + SIZE, columns] = equations.by_camera[row, :SIZE]
-        coupling[-3:, columns] = equations.by_camera[row, SIZE:]
-    steps = zip(equations.rest_by_state, equations.rest_by_camera, strict=True)
+        coupling[SIZE * row : SIZE * row + SIZE, columns] = cameras.by_camera[row, :SIZE]
+        coupling[-3:, columns] = cameras.by_camera[row, SIZE:]
+    steps = zip(cameras.rest_by_state, cameras.rest_by_camera, strict=True)
     for row, (by_state, by_camera) in enumerate(steps):
         place = slice(6 * row, 6 * row + 12)
         coupling[place, place] += np.outer(by_state, by_camera)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -116,6 +118,25 @@ class Trajectory:
 
 
 @dataclass(frozen=True, eq=False)
+class CameraTerms:
+    """What the normal equations of a track would have of small motions of its cameras.
+
+    Each motion is in the camera's own frame [m, rad].
+    """
+
+    by_camera: Floats
+    """Blocks of each state, and of the size, and the motion of its camera, shape (n, 9, 6)."""
+    of_camera: Floats
+    """Blocks of these motions, shape (n, 6, 6)."""
+    gradient: Floats
+    """By these motions, shape (n, 6)."""
+    rest_by_state: Floats
+    """Errors of the heights of what rests by the states before and after, shape (n - 1, 12)."""
+    rest_by_camera: Floats
+    """The same by the motions of both cameras, shape (n - 1, 12)."""
+
+
+@dataclass(frozen=True, eq=False)
 class Equations:
     """The normal equations of a track: states in a chain, and the size that all boxes share."""
 
@@ -135,20 +156,16 @@ class Equations:
     """Of the states, shape (n, 6)."""
     gradient_size: Floats
     """Shape (3,)."""
-    by_camera: Floats
-    """Blocks of each state, and of the size, and the motion of its camera, shape (n, 9, 6)."""
-    of_camera: Floats
-    """Blocks of these motions, shape (n, 6, 6)."""
-    gradient_camera: Floats
-    """By these motions, shape (n, 6)."""
-    rest_by_state: Floats
-    """Errors of the heights of what rests by the states before and after, shape (n - 1, 12)."""
-    rest_by_camera: Floats
-    """The same by the motions of both cameras, shape (n - 1, 12)."""
     log_density: float
     """What the cost lacks of minus the log density of motion and size: minus this."""
     chi2: Floats
     """Of each box, shape (n,)."""
+    _make_cameras: Callable[[], CameraTerms]
+
+    @cached_property
+    def cameras(self) -> CameraTerms:
+        """The motions of the cameras; the states of most equations are solved for without them."""
+        return self._make_cameras()
 
 
 def linearize(
@@ -168,7 +185,6 @@ def linearize(
     state, count = at.state, len(at.state)
     half = np.exp(at.log_half)
     feet = problem.feet(state)
-    rise = problem.rise(feet)
     seen = predict_boxes(problem.views, feet, state[:, HEADING], half)
     if not (seen.is_whole | (seen.in_front & problem.truncated.any(axis=1))).all():
         return None
@@ -185,8 +201,7 @@ def linearize(
     by_state[..., :ABOVE] = seen.by_place[..., :2] + seen.by_place[..., 2:3] * slope
     by_state[..., ABOVE] = seen.by_place[..., 2] * problem.above[:, None]
     by_state[..., HEADING] = seen.by_place[..., 3]
-    of_camera = seen.by_camera + seen.by_place[..., 2:3] * rise[:, None]
-    by_state, by_size, by_camera = scale * by_state, scale * seen.by_size, scale * of_camera
+    by_state, by_size = scale * by_state, scale * seen.by_size
     transposed = by_state.transpose(0, 2, 1)
     diagonal = transposed @ by_state
     of_boxes = np.diagonal(diagonal, axis1=1, axis2=2).copy()
@@ -202,14 +217,24 @@ def linearize(
     gradient[:-1] += np.einsum("nij,nj->ni", back, steps.error)
     gradient[1:] += np.einsum("nij,nj->ni", on, steps.error)
 
-    # Where the ground follows the cameras, the height in the world of what rests does, too.
-    to_rise = np.where(moves, 0.0, steps.by_to[:, ABOVE, ABOVE] / above[1:])[:, None]
-    rest_by_camera = np.concatenate([-to_rise * rise[:-1], to_rise * rise[1:]], axis=1)
-    rest_by_state = np.concatenate([steps.by_from[:, ABOVE], steps.by_to[:, ABOVE]], axis=1)
-    gradient_camera = np.einsum("nij,ni->nj", by_camera, error)
-    pull = rest_by_camera * steps.error[:, ABOVE, None]
-    gradient_camera[:-1] += pull[:, :6]
-    gradient_camera[1:] += pull[:, 6:]
+    def cameras() -> CameraTerms:
+        rise = problem.rise(feet)
+        by_camera = scale * (seen.by_camera + seen.by_place[..., 2:3] * rise[:, None])
+        # Where the ground follows the cameras, the height in the world of what rests does, too.
+        to_rise = np.where(moves, 0.0, steps.by_to[:, ABOVE, ABOVE] / above[1:])[:, None]
+        rest_by_camera = np.concatenate([-to_rise * rise[:-1], to_rise * rise[1:]], axis=1)
+        gradient = np.einsum("nij,ni->nj", by_camera, error)
+        pull = rest_by_camera * steps.error[:, ABOVE, None]
+        gradient[:-1] += pull[:, :6]
+        gradient[1:] += pull[:, 6:]
+        both = np.concatenate([by_state, by_size], axis=2).transpose(0, 2, 1)
+        return CameraTerms(
+            both @ by_camera,
+            by_camera.transpose(0, 2, 1) @ by_camera,
+            gradient,
+            np.concatenate([steps.by_from[:, ABOVE], steps.by_to[:, ABOVE]], axis=1),
+            rest_by_camera,
+        )
 
     sigmas = first_sigmas(bool(moves[0]), problem.noise)
     middle = first.copy()
@@ -219,7 +244,6 @@ def linearize(
     gradient[0] += off / sigmas
     off_size = at.log_half - problem.size.log_half
     precision = problem.size.precision
-    both = np.concatenate([by_state, by_size], axis=2).transpose(0, 2, 1)
     cost += 0.5 * float(np.sum(steps.error**2) + off @ off + off_size @ precision @ off_size)
     return Equations(
         cost,
@@ -230,15 +254,11 @@ def linearize(
         np.einsum("nki,nkj->ij", by_size, by_size) + precision,
         gradient,
         np.einsum("nki,nk->i", by_size, error) + precision @ off_size,
-        both @ by_camera,
-        by_camera.transpose(0, 2, 1) @ by_camera,
-        gradient_camera,
-        rest_by_state,
-        rest_by_camera,
         steps.log_density
         - float(np.log(sigmas).sum())
         + 0.5 * float(np.linalg.slogdet(precision)[1]),
         chi2,
+        cameras,
     )
 
 
