@@ -11,7 +11,7 @@
 
 namespace dqslam {
 
-/// To order a large matrix takes longer than to factorize it, and the stages of a solve mostly
+/// To order a large matrix takes about as long as to factorize it, and the stages of a solve mostly
 /// couple the same blocks, or some less where boxes were thrown out.  Threads may share a cache.
 class LayoutCache {
  public:
