@@ -64,7 +64,7 @@ nitpick_ignore_regex = [
     ("py:.*", r"dqslam\.association\.scene_map\.SceneMap"),  # the inside of an association
     (
         "py:.*",
-        r"dqslam\.places\.(sensor\.Sensor|locate_upright\.Upright|together\.Solved)",
+        r"dqslam\.places\.(sensor\.Sensor|upright\.Upright|merging\.together\.Solved)",
     ),  # that of a map
 ]
 autodoc_member_order = "bysource"

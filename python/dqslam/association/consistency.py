@@ -43,10 +43,8 @@ MOVER_MIN_COST_PER_BOX = 2.0
 MOVER_MIN_COST_RATIO = 2.0
 # A median of fewer boxes is chance.
 MOVER_MIN_BOXES = 8
-# The path hardly changes any more after so many iterations without an object. After a few of them,
-# it has more than this share of what the end has in cost and fit: with less, nothing has moved.
-MOVER_MAX_ITERATIONS, MOVER_FIRST_ITERATIONS = 8, 2
-MOVER_FIRST_SHARE = 0.5
+# The path hardly changes any more after so many iterations without an object.
+MOVER_MAX_ITERATIONS = 8
 # Median of chi-square with 4 degrees of freedom: how well the boxes of an object at rest fit.
 MEDIAN_CHI2 = 3.36
 
@@ -228,18 +226,11 @@ def _fits_without(
     with_all, _ = scene.solve_without(movers, max_iterations=MOVER_MAX_ITERATIONS)
     for row in object_rows:
         rows = np.flatnonzero(shown == row)
-        for iterations, share in (
-            (MOVER_FIRST_ITERATIONS, MOVER_FIRST_SHARE),
-            (MOVER_MAX_ITERATIONS, 1.0),
-        ):
-            without, poses = scene.solve_without([*movers, row], max_iterations=iterations)
-            if 2.0 * (with_all - without) / len(rows) < share * least:
-                break
-            ellipsoids, _ = scene.fit_groups([rows], poses)
-            chi2 = scene.chi2(rows, np.repeat(ellipsoids, len(rows), axis=0), poses=poses)
-            fit = float(np.median(chi2))
-            if fit <= share * MOVER_MIN_CHI2:
-                break
-        else:
-            fits[row] = fit
+        without, poses = scene.solve_without([*movers, row], max_iterations=MOVER_MAX_ITERATIONS)
+        if 2.0 * (with_all - without) / len(rows) < least:
+            continue
+        ellipsoids, _ = scene.fit_groups([rows], poses)
+        fit = scene.chi2(rows, np.repeat(ellipsoids, len(rows), axis=0), poses=poses)
+        if np.median(fit) > MOVER_MIN_CHI2:
+            fits[row] = float(np.median(fit))
     return fits
