@@ -150,12 +150,12 @@ TEST(Body, RoundingIsExactAtZeroAndSmallElsewhere) {
   for (const Shape shape : kShapes) {
     const Scene<Se3> sharp(random, {shape});
     Body<double> rounded = sharp.InCamera();
-    rounded.rounding = 0.02;
+    rounded.rounding = RoundedModel(shape).rounding;
     Eigen::Vector4d expected, box;
     ASSERT_TRUE(ProjectToBox(sharp.InCamera(), sharp.camera, &expected));
     ASSERT_TRUE(ProjectToBox(rounded, sharp.camera, &box));
     const double size = (expected.tail<2>() - expected.head<2>()).maxCoeff();
-    EXPECT_LT((box - expected).cwiseAbs().maxCoeff(), 0.01 * size);
+    EXPECT_LT((box - expected).cwiseAbs().maxCoeff(), 0.002 * size);
     EXPECT_GT((box - expected).cwiseAbs().maxCoeff(), 0);
   }
 }
@@ -301,12 +301,31 @@ TEST(BodyPriors, ByHand) {
   EXPECT_NEAR(tilt_of(Shape::kCuboid), 0.5, 1e-12);
 }
 
+// A small tilt counts as if the body had to stand upright, and a large one as three sigmas.
+TEST(BodyPriors, ABodyStandsUnlessItLeansFar) {
+  const Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
+  for (const Shape shape : kShapes) {
+    const auto cost_of = [&](double tilt, double sigma) {
+      const Vector9d body = BodyParameters(
+          {0, 0, 0}, {0.2, 0.3, 0.9}, Eigen::AngleAxisd(tilt, Eigen::Vector3d::UnitX()).matrix());
+      const CostPointer cost(BodyStandsCost::Create(BodyUprightCost{{}, shape, up, sigma}));
+      return ResidualOf(*cost, {LandmarkBlock(body)}).norm();
+    };
+    EXPECT_NEAR(cost_of(1e-4, 0.02), 1e-4 / 0.02, 1e-7);
+    const double off = 0.5 * std::sin(0.06) / 0.01;  // the product of two direction cosines
+    EXPECT_NEAR(cost_of(0.03, 0.01), off / std::sqrt(1 + off * off / 9), 1e-12);
+    EXPECT_NEAR(cost_of(M_PI / 4, 0.001), 3, 1e-4);
+  }
+}
+
 TEST(BodyPriors, JacobiansMatchPerturbation) {
   Random random(7);
   const Eigen::Vector3d up = random.UnitQuaternion().head<3>().normalized();
   for (const Shape shape : kShapes) {
     const std::vector<Block> body = {LandmarkBlock(RandomBody(random, {1, -2, 0.5}))};
     ExpectJacobiansMatchPerturbation(*CostPointer(BodyUprightCost::Create(shape, up, 0.1)), body);
+    ExpectJacobiansMatchPerturbation(
+        *CostPointer(BodyStandsCost::Create(BodyUprightCost{{}, shape, up, 0.1})), body);
     ExpectJacobiansMatchPerturbation(*CostPointer(BodySupportCost::Create(shape, up, 0.5, 0.1)),
                                      body);
     ExpectJacobiansMatchPerturbation(*CostPointer(BodySizeCost::Create(-1.0, 0.7)), body);

@@ -8,13 +8,16 @@
 //   BodyUprightCost  With v = R^T n the entries are the products v_j v_k / sigma of two axes.  They
 //                    are zero when n is an axis, and for a small tilt [rad] one is the tilt.  Of a
 //                    cylinder only its own axis counts, or all that lie across it.
+//   BodyStandsCost   The same, bounded as in costs/bounded.h: the body stands upright unless its
+//                    boxes show that it does not.
 //   BodySupportCost  r = (n.c + d - h(n)) / sigma.  It is zero when the lowest point lies on the
 //                    plane {x : n.x + d = 0}.
 //
-// Blocks: body [9].  Residuals: [3], [2], [3], [1], in sigmas.  None of them fails.
+// Blocks: body [9].  Residuals: [3], [2], [3], [3], [1], in sigmas.  None of them fails.
 #pragma once
 
 #include "dqslam/costs/autodiff_cost.h"
+#include "dqslam/costs/bounded.h"
 #include "dqslam/geometry/body.h"
 
 namespace dqslam {
@@ -55,6 +58,17 @@ struct BodyUprightCost : AutoDiffCost<BodyUprightCost, 3, kLandmarkSize> {
     residual[0] = v[1] * v[2] / T(sigma);
     residual[1] = v[0] * v[2] / T(sigma);
     residual[2] = shape == Shape::kCuboid ? T(v[0] * v[1] / T(sigma)) : T(0);
+    return true;
+  }
+};
+
+struct BodyStandsCost : AutoDiffCost<BodyStandsCost, 3, kLandmarkSize> {
+  BodyUprightCost upright;
+
+  template <typename T>
+  bool operator()(const T* body, T* residual) const {
+    upright(body, residual);
+    BoundBySwitch(3, residual);
     return true;
   }
 };

@@ -12,14 +12,14 @@
 //                  one, seen from above, is round.
 //   PlumbCost      r = cross(n, S n) / (n^T S n sigma), as UprightCost.
 //
-// Each may be wrong: a residual is divided by sqrt(1 + |r|^2 / 9), which is the closed form of a
-// switch (Geman & McClure), so that it costs 4.5 at most.
+// Each may be wrong, and is bounded as in costs/bounded.h.
 //
 // Blocks: object [9], shared [1]; object, object (three times); object.  Residuals in sigmas.
 // None of them fails.
 #pragma once
 
 #include "dqslam/costs/autodiff_cost.h"
+#include "dqslam/costs/bounded.h"
 #include "dqslam/geometry/body.h"
 
 namespace dqslam {
@@ -41,23 +41,6 @@ Standing<T> Stand(const Surface<T>& object, const Vector3<T>& up) {
 template <typename T>
 Standing<T> Stand(const Body<T>& object, const Vector3<T>& up) {
   return {object.center, object.factor * object.factor.transpose(), Width(object, up)};
-}
-
-inline constexpr double kSquaredBound = 9;
-
-/// Bounds the norm of a residual by 3, as a switch does where it does not fit.
-template <typename T>
-void BoundBySwitch(int size, T* residual) {
-  using std::sqrt;
-  T squared(0);
-  for (int i = 0; i < size; ++i) squared += residual[i] * residual[i];
-  const T scale = T(1) / sqrt(T(1) + squared / T(kSquaredBound));
-  for (int i = 0; i < size; ++i) residual[i] *= scale;
-}
-
-/// The norm of a residual before it was bounded.
-inline double NormBeforeSwitch(double bounded) {
-  return bounded / std::sqrt(1 - bounded * bounded / kSquaredBound);
 }
 
 template <typename Model>

@@ -51,7 +51,7 @@ struct BodyModel {
 
 /// The model that is estimated.  Its edges are so little rounded that a box is off by a thousandth.
 inline BodyModel RoundedModel(Shape shape) {
-  return {shape, 0.02};
+  return {shape, 0.005};
 }
 
 template <typename T>

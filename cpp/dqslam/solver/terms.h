@@ -88,19 +88,24 @@ bool VisitObjectPriors(double log_size_mean,
          visit(SupportPlaneCost{{}, scene.up, scene.plane_offset, scene.support_sigma});
 }
 
-/// The same for a cuboid or a cylinder.  It is upright, if only weakly, unless the scene says more:
-/// seen from one height, its tilt has no effect to first order.
+/// The same for a cuboid or a cylinder, and that it stands upright.  A tilt moves its lowest point
+/// down whichever way it leans, so that free tilts would all grow with the noise of boxes, and the
+/// bodies with them.  In space the vertical is hardly known, and a body may lie in any way.
 template <typename Visit>
 bool VisitBodyPriors(Shape shape,
                      double log_size_mean,
                      double log_size_sigma,
                      const ScenePriors& scene,
-                     double upright_sigma,
+                     bool on_plane,
                      Visit&& visit) {
+  constexpr double kOnPlane = 0.02, kInSpace = 1;  // radians
   if (!visit(BodySizeCost{{}, log_size_mean, log_size_sigma})) return false;
   if (shape == Shape::kCylinder && !visit(RoundCost{})) return false;
-  const double tilt = scene.upright_sigma > 0 ? scene.upright_sigma : upright_sigma;
-  if (!visit(BodyUprightCost{{}, shape, scene.up, tilt})) return false;
+  const bool may_lie = on_plane && scene.upright_sigma == 0;
+  const double usual = on_plane ? kOnPlane : kInSpace;
+  const double sigma = scene.upright_sigma > 0 ? scene.upright_sigma : usual;
+  const BodyUprightCost upright{{}, shape, scene.up, sigma};
+  if (!(may_lie ? visit(BodyStandsCost{{}, upright}) : visit(upright))) return false;
   return scene.support_sigma == 0 ||
          visit(BodySupportCost{{}, shape, scene.up, scene.plane_offset, scene.support_sigma});
 }
@@ -210,8 +215,7 @@ bool VisitOtherTerms(const PreparedGraph& prepared, const StageTerms& terms, Vis
     if (!defined) return false;
   }
   if constexpr (Landmark::kModel == LandmarkModel::kEllipsoid) {
-    // On the plane the vertical is known.
-    const double upright = Pose::kModel == PoseModel::kSe2 ? 0.2 : 1.0;
+    constexpr bool kOnPlane = Pose::kModel == PoseModel::kSe2;
     for (const int object : terms.variables.objects) {
       const double mean = graph.size_prior.log_mean[object];
       const double sigma = graph.size_prior.log_sigma[object];
@@ -230,7 +234,7 @@ bool VisitOtherTerms(const PreparedGraph& prepared, const StageTerms& terms, Vis
       const bool defined =
           shape == Shape::kEllipsoid
               ? VisitObjectPriors(mean, sigma, graph.scene_priors, visit)
-              : VisitBodyPriors(shape, mean, sigma, graph.scene_priors, upright, visit);
+              : VisitBodyPriors(shape, mean, sigma, graph.scene_priors, kOnPlane, visit);
       if (!defined) return false;
     }
     if (!VisitPlacements(graph, terms, visitor)) return false;
