@@ -56,6 +56,21 @@ def test_objects_on_a_table(table, mode):
     assert is_fixed == (mode == dq.Mode.MAPPING)
 
 
+def test_a_rule_without_force_leaves_the_estimate(table):
+    recording, truth = table
+    recording = replace(
+        recording, odometry=dq.Odometry.from_poses(truth.poses, covariance=np.eye(6))
+    )
+    options = dq.RunOptions(mode=dq.Mode.MAPPING, trust_ids=1.0)
+    loose = dq.PlacementRules((dq.PlacementRule("on", None, "plane", 100.0),))
+    result = dq.run(recording, options)
+    placed = dq.run(recording, replace(options, placements=loose)).estimate
+    # Only a size prior about the mean of the sides still pulls.
+    sigmas = np.sqrt(np.einsum("nii->ni", result.marginals.centers))
+    assert np.all(np.abs(placed.centers - result.estimate.centers) < 0.2 * sigmas)
+    np.testing.assert_array_equal(placed.poses, result.estimate.poses)
+
+
 def in_the_frame_of_the_first_camera(recording, truth):
     """The same table in a world whose axes are those of the first camera."""
     first = _core.world_from_camera(dq.PoseModel.SE3, recording.camera, truth.poses[:1])

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import dqslam as dq
 from dqslam.recording import Recording, Truth
@@ -143,3 +144,24 @@ def test_a_body_that_has_bent_the_path_is_found_again(seed: int) -> None:
     _, from_truth = dq.solve(graph, options, start=true_state(graph, truth, options))
     assert summary.converged
     assert summary.final_cost < from_truth.final_cost + 0.2
+
+
+def test_the_noise_of_few_boxes_tilts_no_cube() -> None:
+    # A free tilt of the cube with eight boxes moves its center by six of its sigmas.
+    recording, truth = dq.simulate(dq.load_scenario("paper"), seed=9)
+    recording = replace(recording, positions=None)
+    settings = Settings(bound=True, shape="cuboid")
+    graph = assumptions_of(dq.load_scenario("paper"), settings).graph(recording)
+    estimate, _ = dq.solve(graph)
+    tilt = np.array([_tilt(vector) for vector in estimate.landmarks[:, 6:]])
+    assert tilt.max() < 0.05
+    rows = [truth.object_ids.tolist().index(each) for each in estimate.object_ids]
+    errors = truth.centers[rows] - estimate.centers
+    nees = normalized_squares(errors, dq.marginal_covariances(graph, estimate).centers)
+    assert nees.max() < 5.5
+
+
+def _tilt(rotation_vector: np.ndarray) -> float:
+    """Return the angle between up and the axis of a cuboid that is nearest to it, radians."""
+    up = Rotation.from_rotvec(rotation_vector).as_matrix()[2]
+    return float(np.arccos(min(np.abs(up).max(), 1.0)))

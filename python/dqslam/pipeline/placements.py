@@ -65,7 +65,7 @@ def with_placements(
     landmarks = before.landmarks if len(before.landmarks) else before.ellipsoids
     estimate = replace(
         before,
-        poses=found.poses,
+        poses=before.poses if poses_stay else found.poses,
         ellipsoids=_with_rows(before.ellipsoids, rows, found.ellipsoids),
         dual_quadrics=_with_rows(before.dual_quadrics, rows, found.dual_quadrics),
         landmarks=_with_rows(landmarks, rows, found.landmarks),
