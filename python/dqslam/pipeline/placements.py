@@ -10,13 +10,15 @@ from dqslam import _core
 from dqslam._checks import Floats, Ints
 from dqslam.assumptions import PlacementRules
 from dqslam.estimate import Estimate
+from dqslam.graph import Graph
 from dqslam.metrics import up_direction
 from dqslam.pipeline.conclude import EstimatorOutput
 from dqslam.pipeline.options import RunOptions
 from dqslam.pipeline.placement_report import describe_placements
-from dqslam.pipeline.problem import problem_of, with_repeated_errors
+from dqslam.pipeline.problem import believed_problem
 from dqslam.placements import placed_covariances, solve_with_placements
 from dqslam.recording import Recording
+from dqslam.solids import project_to_boxes
 from dqslam.subgraph import rebuilt
 
 # The cameras' own direction is known to some 20 degrees only: z is believed if it is within 45.
@@ -37,10 +39,11 @@ def with_placements(
     rules, before = options.placements, output.estimate
     if rules is None or not len(before.object_ids) or np.isnan(before.ellipsoids).any():
         return output
+    believed = believed_problem(output, recording)
+    if believed is None:
+        return output
     rules = _with_up(rules, before)
-    graph, state = problem_of(output, recording)
-    if output.repeated is not None:  # else all boxes of an object together would outweigh any rule
-        graph = with_repeated_errors(graph, state, output.repeated, output)
+    graph, state = believed
     rows = np.searchsorted(before.object_ids, graph.object_ids)
     if before.object_shapes:
         shapes = [before.object_shapes[row] for row in rows]
@@ -56,13 +59,13 @@ def with_placements(
     )
     if poses_stay:
         solver.mode = _core.Mode.MAPPING
-        graph = replace(graph, core=rebuilt(graph.core, initial_poses=state.poses))
+        graph = _as_estimated(graph, state, before)
     placed, found, summary, placements = solve_with_placements(graph, rules, solver, start=state)
     rows = np.searchsorted(before.object_ids, found.object_ids)
     landmarks = before.landmarks if len(before.landmarks) else before.ellipsoids
     estimate = replace(
         before,
-        poses=found.poses,
+        poses=before.poses if poses_stay else found.poses,
         ellipsoids=_with_rows(before.ellipsoids, rows, found.ellipsoids),
         dual_quadrics=_with_rows(before.dual_quadrics, rows, found.dual_quadrics),
         landmarks=_with_rows(landmarks, rows, found.landmarks),
@@ -78,6 +81,44 @@ def with_placements(
         summary=output.summary if poses_stay else summary,
         placements=describe_placements(placements, found, rules),
     )
+
+
+def _as_estimated(graph: Graph, state: _core.State, estimate: Estimate) -> Graph:
+    """Return the problem at known poses whose solution without rules is nearly the estimate.
+
+    Its boxes are those of the estimated objects, with the variances of the detected ones. A problem
+    of the detected boxes has another solution, as it does not know the errors of the poses and how
+    those of boxes repeat, and that would take the place of the estimate, rules or not. A size prior
+    is about the mean size of the object itself: it only pulls towards equal sides.
+    """
+    core, boxes = graph.core, graph.core.boxes
+    rows = np.searchsorted(estimate.object_ids, graph.object_ids)
+    predicted, in_front = project_to_boxes(
+        core.pose_model,
+        core.camera,
+        state.poses[boxes.pose],
+        estimate.solids.take(rows[boxes.object]),
+    )
+    table = _core.BoxTable(
+        pose=boxes.pose,
+        object=boxes.object,
+        box=np.where(in_front[:, None], predicted, boxes.box),
+        covariance=boxes.covariance,
+        truncated=boxes.truncated,
+    )
+    is_body = estimate.is_body[:, None]
+    sizes = np.where(is_body, estimate.half_lengths, estimate.semi_axes)[rows]
+    prior = _core.SizePriorTable(
+        log_mean=np.log(sizes).mean(axis=1), log_sigma=core.size_prior.log_sigma
+    )
+    changed = rebuilt(
+        core,
+        initial_poses=state.poses,
+        boxes=table,
+        size_prior=prior,
+        shared_sigma=np.zeros(0),
+    )
+    return replace(graph, core=changed)
 
 
 def _with_rows(values: Floats, rows: Ints, changed: Floats) -> Floats:
