@@ -1,7 +1,8 @@
 """What moves, as the last images of a session show it.
 
 Only a window of the last images is looked at, so the work does not grow with the session. Within
-it, the path is that of the session, and as uncertain as the odometry that leads through the window.
+it, the path is that of the session, or of the odometry where the map has something at rest that
+moves, and as uncertain as the odometry that leads through the window.
 """
 
 from __future__ import annotations
@@ -57,9 +58,10 @@ def track_recent(state: State) -> tuple[Track, ...]:
         path_covariance=covariance,
     )
     steps = np.arange(len(recording.timestamps)) + window.begin
+    # A map that has a mover at rest has a path that makes it rest: then odometry is believed.
     found = estimate_tracks(
         recording,
-        state.core.poses_at(steps.tolist()),
+        path if moving else state.core.poses_at(steps.tolist()),
         ellipsoids,
         np.where(np.isin(rows, list(moving)), -1, rows),
         final=settings.believes_ids or settings.trust == FINAL,
