@@ -129,12 +129,8 @@ def _information_of_cameras(fit: TrackFit) -> Floats:
 
     coupling = _coupling(fit.equations)
     information = -(csr_array(coupling.T) @ fit.equations.solve(coupling))
-    for row, own in enumerate(fit.equations.of_camera):
-        place = slice(6 * row, 6 * row + 6)
-        information[place, place] += own
-    for row, own in enumerate(fit.equations.rest_by_camera):
-        place = slice(6 * row, 6 * row + 12)
-        information[place, place] += np.outer(own, own)
+    rest = fit.equations.rest_by_camera
+    _add_blocks(information, fit.equations.of_camera, rest[:, :, None] * rest[:, None])
     return np.asarray(information)
 
 
@@ -153,12 +149,19 @@ def _coupling(equations: Equations) -> Floats:
     """Return the second derivatives by states and size, and motions of cameras, (6 n + 3, 6 n)."""
     count = len(equations.gradient)
     coupling = np.zeros((SIZE * count + 3, 6 * count))
-    for row, own in enumerate(equations.by_camera):
-        columns = slice(6 * row, 6 * row + 6)
-        coupling[SIZE * row : SIZE * row + SIZE, columns] = own[:SIZE]
-        coupling[-3:, columns] = own[SIZE:]
-    steps = zip(equations.rest_by_state, equations.rest_by_camera, strict=True)
-    for row, (by_state, by_camera) in enumerate(steps):
-        place = slice(6 * row, 6 * row + 12)
-        coupling[place, place] += np.outer(by_state, by_camera)
+    by_camera = equations.by_camera
+    rest = equations.rest_by_state[:, :, None] * equations.rest_by_camera[:, None]
+    _add_blocks(coupling[:-3], by_camera[:, :SIZE], rest)
+    coupling[-3:] = by_camera[:, SIZE:].transpose(1, 0, 2).reshape(3, -1)
     return coupling
+
+
+def _add_blocks(square: Floats, own: Floats, pairs: Floats) -> None:
+    """Add blocks (n, 6, 6) of images and (n - 1, 12, 12) of successive ones to a matrix."""
+    count = len(own)
+    blocks, rows = square.reshape(count, 6, count, 6), np.arange(count)
+    blocks[rows, :, rows] += own
+    halves = (slice(0, 6), rows[:-1]), (slice(6, 12), rows[1:])
+    for below, down in halves:
+        for beside, across in halves:
+            blocks[down, :, across] += pairs[:, below, beside]
