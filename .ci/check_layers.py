@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
-ROOMS = ["geometry", "costs", "linear", "problem", "solver", "estimation", "online"]
+ROOMS = ["geometry", "costs", "linear", "tracks", "problem", "solver", "estimation", "online"]
 UMBRELLA = "dqslam/dqslam.h"  # includes all public headers that need no Ceres
 CERES = re.compile(r"(ceres|glog)/")
 USES_CERES = re.compile(

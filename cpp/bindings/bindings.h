@@ -10,5 +10,6 @@ void BindGraph(pybind11::module_& m);
 void BindSolve(pybind11::module_& m);
 void BindCovariance(pybind11::module_& m);
 void BindOnline(pybind11::module_& m);
+void BindTracks(pybind11::module_& m);
 
 }  // namespace dqslam

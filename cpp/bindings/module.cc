@@ -15,4 +15,5 @@ PYBIND11_MODULE(_core, m) {
   dqslam::BindSolve(m);
   dqslam::BindCovariance(m);
   dqslam::BindOnline(m);
+  dqslam::BindTracks(m);
 }

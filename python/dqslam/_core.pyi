@@ -25,6 +25,7 @@ __all__: list[str] = [
     "MeasurementTable",
     "Minimizer",
     "Mode",
+    "MotionNoise",
     "OdometryTable",
     "OnlineOptions",
     "Placement",
@@ -32,6 +33,7 @@ __all__: list[str] = [
     "PoseModel",
     "Relocation",
     "Residual",
+    "SHARE_OF_INFORMATION",
     "ScenePriors",
     "Schedule",
     "Session",
@@ -45,6 +47,10 @@ __all__: list[str] = [
     "StepObservations",
     "StepReport",
     "Summary",
+    "TrackEquations",
+    "TrackFit",
+    "TrackProblem",
+    "TrackTrajectory",
     "UnderConstrained",
     "VariableKind",
     "adjoint",
@@ -52,6 +58,7 @@ __all__: list[str] = [
     "between",
     "body_chi_squares",
     "box_chi_squares",
+    "boxes_of_upright_cuboids",
     "calibration_parameters",
     "compose",
     "covariance",
@@ -65,8 +72,10 @@ __all__: list[str] = [
     "ellipsoid_from_dual_quadric",
     "ellipsoid_shapes",
     "fit",
+    "fit_track",
     "inverse",
     "joint_covariance",
+    "linearize_track",
     "log_semi_axes_jacobian",
     "minus",
     "placement_misfits",
@@ -1343,6 +1352,190 @@ class Session:
         Shape (n, d).
         """
 
+class MotionNoise:
+    """
+    How restlessly things of a kind move.
+    """
+    def __init__(
+        self,
+        acceleration: typing.SupportsFloat | typing.SupportsIndex,
+        turn: typing.SupportsFloat | typing.SupportsIndex,
+        slip: typing.SupportsFloat | typing.SupportsIndex,
+        usual_speed: typing.SupportsFloat | typing.SupportsIndex,
+        usual_turn: typing.SupportsFloat | typing.SupportsIndex,
+    ) -> None: ...
+    @property
+    def acceleration(self) -> float:
+        """
+        Density of the white acceleration, m/s^2 / sqrt(Hz): speed changes by so much in 1 s.
+        """
+    @property
+    def slip(self) -> float:
+        """
+        Density of the motion across the heading, m / sqrt(s).
+        """
+    @property
+    def turn(self) -> float:
+        """
+        The same of the turn rate, rad/s^2 / sqrt(Hz).
+        """
+    @property
+    def usual_speed(self) -> float:
+        """
+        Sigma of the speed, m/s.
+        """
+    @property
+    def usual_turn(self) -> float:
+        """
+        Sigma of the turn rate, rad/s.
+        """
+
+class TrackTrajectory:
+    """
+    States of a thing at its images, and its size.
+    """
+    def __init__(
+        self,
+        state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 6]"],
+        log_half: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
+    ) -> None: ...
+    @property
+    def log_half(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        Logarithms of half the length, width and height [m], shape (3,).
+        """
+    @property
+    def state(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 6]"]:
+        """
+        x, y, height above the ground in sigmas, heading, speed, turn rate; (n, 6).
+        """
+
+class TrackProblem:
+    """
+    The boxes of one thing, one an image.
+    """
+    def __init__(
+        self,
+        camera: Camera,
+        rotation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+        position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+        seconds: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        box: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+        variance: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+        truncated: typing.Annotated[numpy.typing.ArrayLike, numpy.bool, "[m, n]"],
+        plane: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+        above: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        log_half: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
+        size_precision: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"],
+        noise: MotionNoise,
+        ground_follows: bool,
+    ) -> None: ...
+
+class TrackEquations:
+    """
+    Normal equations of a track: states in a chain, and the size.
+    """
+    def solve(
+        self, right: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"]
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Solve for right sides of the states, then of the size, shape (6 n + 3, r).
+        """
+    @property
+    def below(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Blocks of each state and the one before it, shape (n - 1, 6, 6).
+        """
+    @property
+    def border(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Blocks of the states and the size, shape (n, 6, 3).
+        """
+    @property
+    def by_camera(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Blocks of each state, and of the size, and the motion of its camera, shape (n, 9, 6).
+        """
+    @property
+    def chi2(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        Of each box, shape (n,).
+        """
+    @property
+    def corner(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"]:
+        """
+        Block of the size, shape (3, 3).
+        """
+    @property
+    def cost(self) -> float:
+        """
+        Half the sum of squares, after the loss.
+        """
+    @property
+    def diagonal(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Blocks of the states, shape (n, 6, 6).
+        """
+    @property
+    def gradient(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 6]"]:
+        """
+        Of the states, shape (n, 6).
+        """
+    @property
+    def gradient_camera(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 6]"]:
+        """
+        By these motions, shape (n, 6).
+        """
+    @property
+    def gradient_size(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        Shape (3,).
+        """
+    @property
+    def log_density(self) -> float:
+        """
+        What the cost lacks of minus the log density of motion and size: minus this.
+        """
+    @property
+    def of_boxes(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 6]"]:
+        """
+        What boxes add to the diagonal of the blocks of the states, shape (n, 6).
+        """
+    @property
+    def of_camera(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Blocks of these motions, shape (n, 6, 6).
+        """
+    @property
+    def rest_by_camera(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        The same by the motions of both cameras, shape (n - 1, 12).
+        """
+    @property
+    def rest_by_state(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Errors of heights of what rests by the states before and after, (n - 1, 12).
+        """
+
+class TrackFit:
+    """
+    The estimate of a track under one hypothesis.
+    """
+    @property
+    def converged(self) -> bool: ...
+    @property
+    def equations(self) -> TrackEquations:
+        """
+        At the estimate.
+        """
+    @property
+    def log_evidence(self) -> float:
+        """
+        Log of the marginal likelihood, by Laplace's method, up to what all hypotheses share.
+        """
+    @property
+    def trajectory(self) -> TrackTrajectory: ...
+
 def adjoint(
     model: PoseModel, a_from_b: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"]
 ) -> numpy.typing.NDArray[numpy.float64]:
@@ -1396,6 +1589,18 @@ def box_chi_squares(
 ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
     """
     Chi-squares (n,), 4 degrees of freedom, of boxes (n, 4) with covariances (n, 16) [px^2] and edges that the image border cut (n, 4), for ellipsoid i from pose i. An edge that only bounds the object counts where the prediction ends inside. Infinite unless the object is strictly in front.
+    """
+
+def boxes_of_upright_cuboids(
+    camera: Camera,
+    rotation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    foot: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    heading: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    half: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
+) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+    """
+    Boxes (n, 4) of a cuboid of half sides (3,) at feet (n, 3) and headings (n,), seen by cameras at positions (n, 3) with axes (3 n, 3), one below the other.
     """
 
 def calibration_parameters() -> list[CalibrationParameter]:
@@ -1499,6 +1704,16 @@ def fit(graph: Graph, options: SolveOptions, state: State) -> Fit:
     Residuals and leverage of odometry and boxes, from which variance components are estimated.
     """
 
+def fit_track(
+    problem: TrackProblem,
+    start: TrackTrajectory,
+    moves: typing.Annotated[numpy.typing.ArrayLike, numpy.bool, "[m, 1]"],
+    max_iterations: typing.SupportsInt | typing.SupportsIndex,
+) -> TrackFit | None:
+    """
+    Minimize from a start; None where a box is undefined at the start.
+    """
+
 def inverse(
     model: PoseModel, a_from_b: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"]
 ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
@@ -1515,6 +1730,17 @@ def joint_covariance(
 ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
     """
     Joint covariance of some poses and objects: k rows for each pose, then 9 rows for each object.
+    """
+
+def linearize_track(
+    problem: TrackProblem,
+    at: TrackTrajectory,
+    moves: typing.Annotated[numpy.typing.ArrayLike, numpy.bool, "[m, 1]"],
+    first: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 1]"],
+    information: typing.SupportsFloat | typing.SupportsIndex = 1.0,
+) -> TrackEquations | None:
+    """
+    Normal equations at some states; None where a box is undefined.
     """
 
 def log_semi_axes_jacobian(
@@ -1647,3 +1873,5 @@ def world_from_camera(
     """
     SE(3) poses of the camera, shape (n, 7).
     """
+
+SHARE_OF_INFORMATION: float = 0.8

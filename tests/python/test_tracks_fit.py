@@ -5,10 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dqslam import Camera
+from dqslam import Camera, _core
 from dqslam.tracks.body import Views, predict_boxes
 from dqslam.tracks.fit import (
-    SHARE_OF_INFORMATION,
     covariance,
     evidence_with_path,
     fit_track,
@@ -32,7 +31,7 @@ def oncoming(noise_px=0.0, seed=0):
     size = body_size("car")
     views = Views(CAMERA, np.tile(AHEAD, (COUNT, 1, 1)), np.tile([0.0, 0.0, 1.6], (COUNT, 1)))
     foot = np.column_stack([state[:, :2], np.zeros(COUNT)])
-    box = predict_boxes(views, foot, state[:, HEADING], np.exp(size.log_half)).box
+    box = predict_boxes(views, foot, state[:, HEADING], np.exp(size.log_half))
     box += noise_px * np.random.default_rng(seed).normal(size=box.shape)
     problem = TrackProblem(
         views,
@@ -90,7 +89,7 @@ def test_derivatives_by_cameras_that_the_ground_follows_are_small_differences(mo
         step = (e * np.eye(6 * COUNT)[place]).reshape(-1, 6)
         costs = [linearize(problem.moved(s * step), at, moves, first).cost for s in (1, -1)]
         expected = (costs[0] - costs[1]) / (2 * e)
-        found = equations.cameras.gradient.ravel()[place]
+        found = equations.gradient_camera.ravel()[place]
         assert found == pytest.approx(expected, rel=1e-3, abs=0.05)
 
 
@@ -104,7 +103,7 @@ def test_a_world_that_turns_as_a_whole_turns_tracks_and_leaves_speeds():
     change = {}
     for follows in (True, False):
         fit = fit_track(replace(problem, ground_follows=follows), truth, MOVES)
-        change[follows] = (covariance(fit)[1] @ motion)[:-3].reshape(-1, 6)
+        change[follows] = (covariance(fit.equations)[1] @ motion)[:-3].reshape(-1, 6)
     # It stays upright, which is what is left.
     assert np.abs(change[True][:, SPEED]).max() < 0.005
     assert np.abs(change[True][:, :2]).max() < 0.06
@@ -130,7 +129,7 @@ def test_covariance_and_evidence_are_those_of_the_dense_equations():
     problem, truth = oncoming(noise_px=1.0)
     fit = fit_track(problem, truth, MOVES)
     full = dense(fit.equations)
-    spread, by_camera = covariance(fit)
+    spread, by_camera = covariance(fit.equations)
     np.testing.assert_allclose(spread @ full, np.eye(len(full)), atol=1e-6)
     expected = fit.equations.log_density - fit.equations.cost
     expected -= 0.5 * np.linalg.slogdet(full)[1]
@@ -152,7 +151,7 @@ def test_a_path_that_is_exact_adds_no_evidence_and_one_that_errs_explains_a_cree
         position=problem.views.position + 0.02 * np.arange(COUNT)[:, None] * [0, 1, 0],
     )
     foot = np.column_stack([state[:, :2], np.zeros(COUNT)])
-    box = predict_boxes(shifted, foot, state[:, HEADING], np.exp(truth.log_half)).box
+    box = predict_boxes(shifted, foot, state[:, HEADING], np.exp(truth.log_half))
     crept = replace(problem, box=box)
     fit = fit_track(crept, Trajectory(state, truth.log_half), ~MOVES)
     none = np.zeros((6 * COUNT, 6 * COUNT))
@@ -169,7 +168,7 @@ def test_the_evidence_of_a_path_that_errs_a_little_is_that_of_a_normal():
     problem, truth = oncoming(noise_px=0.5)
     fit = fit_track(problem, truth, MOVES)
     size, e = 6 * COUNT, 1e-4
-    gradient = fit.equations.cameras.gradient.ravel()
+    gradient = fit.equations.gradient_camera.ravel()
     one = np.zeros(size)
     one[[0, 6, 13]] = 1.0, -0.5, 0.7
     path = 1e-4 * np.outer(one, one)  # all cameras move by one random number
@@ -195,7 +194,7 @@ def test_a_path_far_off_is_moved_to_where_a_thing_rests():
     state[:, SPEED] = 0.0
     seen = problem.moved(motion).views
     foot = np.column_stack([state[:, :2], np.zeros(COUNT)])
-    box = predict_boxes(seen, foot, state[:, HEADING], np.exp(truth.log_half)).box
+    box = predict_boxes(seen, foot, state[:, HEADING], np.exp(truth.log_half))
     jumping = replace(problem, box=box)
     fit = fit_track(jumping, Trajectory(state, truth.log_half), ~MOVES)
     assert fit.equations.cost > 40.0
@@ -209,11 +208,13 @@ def test_a_path_far_off_is_moved_to_where_a_thing_rests():
 def test_boxes_tell_four_fifths_of_what_the_weights_of_a_robust_loss_say():
     problem, truth = oncoming(noise_px=1.0)
     fit = fit_track(problem, truth, MOVES)
-    whole, told = fit.equations, with_information(problem, fit, MOVES).equations
-    np.testing.assert_allclose(told.of_boxes, SHARE_OF_INFORMATION * whole.of_boxes, rtol=1e-9)
+    whole, told = fit.equations, with_information(problem, fit, MOVES)
+    share = _core.SHARE_OF_INFORMATION
+    assert share == 0.8
+    np.testing.assert_allclose(told.of_boxes, share * whole.of_boxes, rtol=1e-9)
     np.testing.assert_allclose(told.below, whole.below)
     prior = problem.size.precision
-    expected = prior + SHARE_OF_INFORMATION * (whole.corner - prior)
+    expected = prior + share * (whole.corner - prior)
     np.testing.assert_allclose(told.corner, expected)
 
 
@@ -235,3 +236,20 @@ def test_edges_that_are_cut_bound_from_one_side():
         costs.append(linearize(changed, truth, MOVES, truth.state[0]).cost)
     assert costs[0] == pytest.approx(costs[1])
     assert costs[2] > costs[0] + 10.0
+
+
+def test_states_and_moves_that_do_not_fit_the_boxes_are_refused():
+    problem, truth = oncoming()
+    with pytest.raises(ValueError, match="a state for each"):
+        fit_track(problem, Trajectory(truth.state[1:], truth.log_half), MOVES)
+    with pytest.raises(ValueError, match="a state for each"):
+        fit_track(problem, truth, MOVES[1:])
+    with pytest.raises(ValueError, match="a row for each image"):
+        replace(problem, box=problem.box[1:]).core  # noqa: B018
+
+
+def test_a_right_side_has_a_row_for_each_unknown():
+    problem, truth = oncoming()
+    equations = linearize(problem, truth, MOVES, truth.state[0])
+    with pytest.raises(ValueError, match="a row for each unknown"):
+        equations.solve(np.zeros((6 * COUNT, 1)))

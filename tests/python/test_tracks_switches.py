@@ -1,6 +1,7 @@
 """When a thing begins to move: all likely times, their weights, and their moments together."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -27,7 +28,7 @@ def leaving(noise_px=0.0):
     position = np.tile([0.0, 0.0, 1.6], (COUNT, 1))
     views = Views(small.views.camera, np.tile(AHEAD, (COUNT, 1, 1)), position)
     foot = np.column_stack([state[:, :2], np.zeros(COUNT)])
-    box = predict_boxes(views, foot, state[:, HEADING], np.exp(truth.log_half)).box
+    box = predict_boxes(views, foot, state[:, HEADING], np.exp(truth.log_half))
     box += noise_px * np.random.default_rng(0).normal(size=box.shape)
     problem = replace(
         small,
@@ -76,7 +77,8 @@ def test_moments_of_two_explanations_are_those_of_a_mixture():
     shifted[:, X] += 1.0
     shifted[:, SPEED] += 0.5
     shifted[:, HEADING] += 2.0 * np.pi  # the same heading
-    other = replace(fit, trajectory=Trajectory(shifted, fit.trajectory.log_half))
+    at = Trajectory(shifted, fit.trajectory.log_half)
+    other = SimpleNamespace(trajectory=at, equations=fit.equations)
     ways = [
         (one, Explanation(one, moves, 0.0), weight) for one, weight in ((fit, 0.75), (other, 0.25))
     ]

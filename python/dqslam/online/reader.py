@@ -12,10 +12,12 @@ from dqslam._repr import counted
 from dqslam.assumptions import OdometryNoise, SizePrior, SizePriors
 from dqslam.estimate import Estimate
 from dqslam.online.locked import locked
+from dqslam.online.moving import track_recent
 from dqslam.online.objects import Objects
 from dqslam.online.readout import read_assignments, read_estimate, read_objects
 from dqslam.online.state import State
 from dqslam.recording import tangent_size
+from dqslam.track import Track
 
 
 class SessionReader:
@@ -117,6 +119,17 @@ class SessionReader:
     def odometry_noise(self) -> OdometryNoise | None:
         """The estimated noise of a step; None if it is not estimated."""
         return self._state.odometry_noise
+
+    @locked
+    def tracks(self) -> tuple[Track, ...]:
+        """Return what moves in the last 40 images: where it was in each, and how fast.
+
+        The last row of a track is where it was last seen: ``track.pose[-1]`` is the step. Things
+        are judged anew each time, so that ``track_id`` names them in one answer only. The work is
+        bounded by these images and by how many things they show, and it is done here, not in
+        ``add``. A class whose size is unknown has no tracks, see docs/tracks.md.
+        """
+        return track_recent(self._state)
 
     @locked
     def estimate(self) -> Estimate:

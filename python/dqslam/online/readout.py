@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
+from itertools import pairwise
+
 import numpy as np
 
 from dqslam._checks import Ints
@@ -22,17 +25,24 @@ def read_objects(state: State) -> Objects:
     )
 
 
-def read_assignments(state: State) -> list[Ints]:
-    """Return the ids of the objects that the boxes of each step show, as known now; -1 for none."""
+def read_assignments(state: State, begin: int = 0) -> list[Ints]:
+    """Return the ids of the objects that the boxes of each step from ``begin`` on show.
+
+    As known now; -1 for none.
+    """
     ids = np.array([*state.registry.ids, -1], dtype=np.int64)
     store, labels = state.store, state.store.labels
-    assignments = [one.copy() for one in state.given_ids]
-    for step, (boxes, tracklets) in store.images.items():
-        assignments[step][boxes] = ids[labels.object_of_tracklet[tracklets]]
-    ends = np.searchsorted(store.box_keyframe, np.arange(1, len(store.keyframes)))
-    for keyframe, rows in zip(store.keyframes, np.split(labels.object_rows, ends), strict=False):
+    assignments = [one.copy() for one in state.given_ids[begin:]]
+    for step, shown in enumerate(assignments, begin):
+        if step in store.images:
+            boxes, tracklets = store.images[step]
+            shown[boxes] = ids[labels.object_of_tracklet[tracklets]]
+    first = bisect_left(store.keyframes, begin, key=lambda one: one.pose)
+    count = len(store.keyframes)
+    ends = np.searchsorted(store.box_keyframe, np.arange(first, count + 1))
+    for keyframe, rows in zip(store.keyframes[first:], pairwise(ends.tolist()), strict=True):
         boxes, _ = store.images[keyframe.pose]
-        assignments[keyframe.pose][boxes] = ids[rows]
+        assignments[keyframe.pose - begin][boxes] = ids[labels.object_rows[slice(*rows)]]
     return assignments
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from collections import deque
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -11,6 +12,7 @@ from dqslam import _core
 from dqslam._checks import Floats, Ints
 from dqslam._ids import ObjectRow
 from dqslam.assumptions import BoxNoise, OdometryNoise, SizePrior, SizePriors
+from dqslam.online.inputs import CheckedBoxes
 from dqslam.online.keyframes import KeyframeStore
 from dqslam.online.objects import Registry
 
@@ -41,6 +43,21 @@ def with_loss(online: _core.OnlineOptions, loss_scale: float) -> _core.OnlineOpt
     )
 
 
+# What moves is looked for in so many of the last images.
+RECENT_IMAGES = 40
+
+
+@dataclass(frozen=True, eq=False)
+class RecentStep:
+    """What a step was given, as it was believed."""
+
+    relative: Floats
+    """From the step before, shape (d,)."""
+    covariance: Floats
+    """Shape (k, k)."""
+    boxes: CheckedBoxes
+
+
 @dataclass(eq=False)
 class State:
     """The state of a session."""
@@ -63,6 +80,8 @@ class State:
     """Given ids of the boxes of each step, -1 for none."""
     shown: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     """Ids of the objects that the boxes of the last step show, -1 for one that waits."""
+    recent: deque[RecentStep] = field(default_factory=lambda: deque(maxlen=RECENT_IMAGES))
+    """The last steps, in order."""
 
     def copy(self) -> State:
         """Return a copy that can be changed independently; it shares the lists of steps."""

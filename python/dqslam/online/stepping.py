@@ -23,7 +23,7 @@ from dqslam.online.inputs import (
     motion_arrays,
     next_time,
 )
-from dqslam.online.state import State
+from dqslam.online.state import RecentStep, State
 from dqslam.online.step import Motion, StepBoxes, StepError, StepMeasurements, StepPositions
 from dqslam.recording import tangent_size
 
@@ -132,6 +132,7 @@ def _take_step(
         state.embedding_size = step.boxes.embedding.shape[1]
     state.timestamps.append(step.time)
     state.given_ids.append(step.boxes.object_id)
+    state.recent.append(RecentStep(step.relative, step.covariance, step.boxes))
     state.shown = step.boxes.object_id
     if count:
         model, end = state.settings.pose_model, state.odometry_end[None]

@@ -17,7 +17,13 @@ from dqslam.pipeline.conclude import EstimatorOutput
 from dqslam.pipeline.options import RunOptions
 from dqslam.pipeline.problem import believed_problem
 from dqslam.recording import Recording
-from dqslam.tracks import PathCovariance, estimate_tracks, find_moving, reckoned_covariance
+from dqslam.tracks import (
+    PathCovariance,
+    estimate_tracks,
+    find_moving,
+    of_cameras,
+    path_by_odometry,
+)
 
 # Iterations of the estimate of the map that movers have been taken from.
 _ITERATIONS = 50
@@ -32,7 +38,7 @@ def without_movers(found: Association, options: RunOptions) -> Association:
     """
     scene, labels = found.scene, found.scene.labels
     takes_part = labels.takes_part[labels.object_rows]
-    path, covariance = _path_by_odometry(scene.recording)
+    path, covariance = path_by_odometry(scene.recording)
     if scene.mode == _core.Mode.MAPPING:
         path, covariance = scene.poses, lambda images: None
     moving = find_moving(
@@ -65,7 +71,7 @@ def moving_objects(
     """
     object_id = recording.detections.object_id
     shown = np.isin(object_id, estimate.object_ids)
-    path, covariance = _path_by_odometry(recording)
+    path, covariance = path_by_odometry(recording)
     moving = find_moving(
         recording,
         path,
@@ -76,25 +82,6 @@ def moving_objects(
         path_covariance=covariance,
     )
     return {int(estimate.object_ids[row]): why for row, why in moving.items()}
-
-
-def _path_by_odometry(recording: Recording) -> tuple[Floats, PathCovariance]:
-    """Return the path of the odometry alone, (n, d), and its covariance."""
-    odometry = recording.odometry
-    path = _core.dead_reckon(odometry.pose_model, odometry.first_pose, odometry.relative)
-    motion = motion_of_camera(odometry.pose_model, recording.camera)
-    return path, lambda images: _of_cameras(reckoned_covariance(odometry, path, images), motion)
-
-
-def _of_cameras(spread: Floats, motion: Floats) -> Floats:
-    """Turn the joint covariance of n poses, (k n, k n), into that of their cameras, (6 n, 6 n).
-
-    ``motion`` (6, k) is the motion of a camera by that of its pose.
-    """
-    count = len(spread) // motion.shape[1]
-    blocks = spread.reshape(count, -1, count, motion.shape[1])
-    moved = np.einsum("ab,ibjc,dc->iajd", motion, blocks, motion, optimize=True)
-    return np.asarray(moved).reshape(6 * count, 6 * count)
 
 
 def with_tracks(
@@ -143,6 +130,6 @@ def _path_covariance(
             spread = _core.joint_covariance(graph.core, solver, state, images.tolist(), [])
         except RuntimeError:  # a box is undefined, or the data leave a pose open
             return None
-        return _of_cameras(spread, motion)
+        return of_cameras(spread, motion)
 
     return joint

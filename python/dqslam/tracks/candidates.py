@@ -164,7 +164,7 @@ def _foot(scene: Scene, ellipsoid: Floats, rows: Ints) -> tuple[Floats, float]:
     if fit is None:
         return lowest, SIGMA_OF_END_M
     middle = SIZE_OF_STATE * (len(rows) // 2) + ABOVE
-    sigma = problem.above[0] * float(np.sqrt(covariance(fit)[0][middle, middle]))
+    sigma = problem.above[0] * float(np.sqrt(covariance(fit.equations)[0][middle, middle]))
     return turn @ np.median(problem.feet(fit.trajectory.state), axis=0), sigma
 
 

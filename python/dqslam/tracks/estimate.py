@@ -124,7 +124,7 @@ def _grounds_of_movers(scene: Scene, moving: list[tuple[Ints, Judgment]]) -> lis
         row = int(np.argmin(distance))
         place = SIZE * row + ABOVE
         sigma = problem.above[row]
-        variance = sigma**2 * covariance(fit)[0][place, place]
+        variance = sigma**2 * covariance(fit.equations)[0][place, place]
         stands[number] = sigma * state[row, ABOVE], variance, distance[row]
     others = [np.delete(stands, number, axis=0) for number in range(len(moving))]
     return [scene.ground.corrected(*some.T) for some in (*others, stands)]

@@ -2,33 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
+from dqslam import _core
 from dqslam._checks import Bools, Floats
-from dqslam.tracks.body import PredictedBoxes, Views, predict_boxes
-from dqslam.tracks.motion import (
-    ABOVE,
-    HEADING,
-    SIZE,
-    SPEED,
-    TURN,
-    MotionNoise,
-    X,
-    Y,
-    compare_steps,
-    first_sigmas,
-)
+from dqslam.tracks.body import Views
+from dqslam.tracks.motion import ABOVE, X, Y
 from dqslam.tracks.sizes import BodySize
 
-# Boxes that do not fit are forgiven as errors of a Student t distribution of so many degrees.
-FREEDOM = 4.0
-# The ground's error is that of another place after so long [s]; where the ground is unknown, things
-# rise or sink by so much at most, m / sqrt(s).
-FORGOTTEN_AFTER_S, MOST_DRIFT = 5.0, 0.5
+Trajectory = _core.TrackTrajectory
+Equations = _core.TrackEquations
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,9 +35,28 @@ class TrackProblem:
     above: Floats
     """Sigma of the height of the foot above it, meters, shape (n,)."""
     size: BodySize
-    noise: MotionNoise
+    noise: _core.MotionNoise
     ground_follows: bool = False
     """Whether the ground is known in the frame of the camera, and goes where that goes."""
+
+    @cached_property
+    def core(self) -> _core.TrackProblem:
+        """What the core estimates."""
+        return _core.TrackProblem(
+            self.views.camera,
+            self.views.axes,
+            self.views.position,
+            self.seconds,
+            self.box,
+            self.variance,
+            self.truncated,
+            self.plane,
+            self.above,
+            self.size.log_half,
+            self.size.precision,
+            self.noise,
+            self.ground_follows,
+        )
 
     def select(self, rows: Bools) -> TrackProblem:
         """Return the problem of some of the boxes, by a flag for each (n,)."""
@@ -107,67 +112,6 @@ class TrackProblem:
         return np.column_stack([place, height + self.above * state[:, ABOVE]])
 
 
-@dataclass(frozen=True, eq=False)
-class Trajectory:
-    """States of a thing at its images, and its size."""
-
-    state: Floats
-    """x, y, height above the ground in sigmas, heading, speed, turn rate; shape (n, 6)."""
-    log_half: Floats
-    """Logarithms of half the length, width and height [m], shape (3,)."""
-
-
-@dataclass(frozen=True, eq=False)
-class CameraTerms:
-    """What the normal equations of a track would have of small motions of its cameras.
-
-    Each motion is in the camera's own frame [m, rad].
-    """
-
-    by_camera: Floats
-    """Blocks of each state, and of the size, and the motion of its camera, shape (n, 9, 6)."""
-    of_camera: Floats
-    """Blocks of these motions, shape (n, 6, 6)."""
-    gradient: Floats
-    """By these motions, shape (n, 6)."""
-    rest_by_state: Floats
-    """Errors of the heights of what rests by the states before and after, shape (n - 1, 12)."""
-    rest_by_camera: Floats
-    """The same by the motions of both cameras, shape (n - 1, 12)."""
-
-
-@dataclass(frozen=True, eq=False)
-class Equations:
-    """The normal equations of a track: states in a chain, and the size that all boxes share."""
-
-    cost: float
-    """Half the sum of squares, after the loss: minus the log density, up to constants."""
-    diagonal: Floats
-    """Blocks of the states, shape (n, 6, 6)."""
-    below: Floats
-    """Blocks of each state and the one before it, shape (n - 1, 6, 6)."""
-    of_boxes: Floats
-    """What the boxes add to the diagonal of these blocks of the states, shape (n, 6)."""
-    border: Floats
-    """Blocks of the states and the size, shape (n, 6, 3)."""
-    corner: Floats
-    """Block of the size, shape (3, 3)."""
-    gradient: Floats
-    """Of the states, shape (n, 6)."""
-    gradient_size: Floats
-    """Shape (3,)."""
-    log_density: float
-    """What the cost lacks of minus the log density of motion and size: minus this."""
-    chi2: Floats
-    """Of each box, shape (n,)."""
-    _make_cameras: Callable[[], CameraTerms]
-
-    @cached_property
-    def cameras(self) -> CameraTerms:
-        """The motions of the cameras; the states of most equations are solved for without them."""
-        return self._make_cameras()
-
-
 def linearize(
     problem: TrackProblem,
     at: Trajectory,
@@ -182,98 +126,4 @@ def linearize(
     of the prior of its first state. ``information`` is what the squared errors of boxes are
     multiplied by, beside their weights.
     """
-    state, count = at.state, len(at.state)
-    half = np.exp(at.log_half)
-    feet = problem.feet(state)
-    seen = predict_boxes(problem.views, feet, state[:, HEADING], half)
-    if not (seen.is_whole | (seen.in_front & problem.truncated.any(axis=1))).all():
-        return None
-    sigma = np.sqrt(problem.variance)
-    error = (seen.box - problem.box) / sigma
-    is_kept = _only_bounds(problem, seen)
-    error = np.where(is_kept, 0.0, error)
-    chi2 = np.sum(error**2, axis=1)
-    weight = information * (FREEDOM + 4.0) / (FREEDOM + chi2)
-    scale = np.where(is_kept, 0.0, np.sqrt(weight)[:, None] / sigma)[:, :, None]
-    error = error * np.sqrt(weight)[:, None]
-    by_state = np.zeros((count, 4, SIZE))
-    slope = problem.plane[:, None, 1:]
-    by_state[..., :ABOVE] = seen.by_place[..., :2] + seen.by_place[..., 2:3] * slope
-    by_state[..., ABOVE] = seen.by_place[..., 2] * problem.above[:, None]
-    by_state[..., HEADING] = seen.by_place[..., 3]
-    by_state, by_size = scale * by_state, scale * seen.by_size
-    transposed = by_state.transpose(0, 2, 1)
-    diagonal = transposed @ by_state
-    of_boxes = np.diagonal(diagonal, axis1=1, axis2=2).copy()
-    gradient = np.einsum("nij,nj->ni", transposed, error)
-    cost = 0.5 * information * (FREEDOM + 4.0) * float(np.log1p(chi2 / FREEDOM).sum())
-
-    drift = min(FORGOTTEN_AFTER_S**-0.5, MOST_DRIFT / float(np.median(problem.above)))
-    seconds, plane, above = np.diff(problem.seconds), problem.plane, problem.above
-    steps = compare_steps(state, seconds, moves, problem.noise, drift, plane, above)
-    back, on = steps.by_from.transpose(0, 2, 1), steps.by_to.transpose(0, 2, 1)
-    diagonal[:-1] += back @ steps.by_from
-    diagonal[1:] += on @ steps.by_to
-    gradient[:-1] += np.einsum("nij,nj->ni", back, steps.error)
-    gradient[1:] += np.einsum("nij,nj->ni", on, steps.error)
-
-    def cameras() -> CameraTerms:
-        rise = problem.rise(feet)
-        by_camera = scale * (seen.by_camera + seen.by_place[..., 2:3] * rise[:, None])
-        # Where the ground follows the cameras, the height in the world of what rests does, too.
-        to_rise = np.where(moves, 0.0, steps.by_to[:, ABOVE, ABOVE] / above[1:])[:, None]
-        rest_by_camera = np.concatenate([-to_rise * rise[:-1], to_rise * rise[1:]], axis=1)
-        gradient = np.einsum("nij,ni->nj", by_camera, error)
-        pull = rest_by_camera * steps.error[:, ABOVE, None]
-        gradient[:-1] += pull[:, :6]
-        gradient[1:] += pull[:, 6:]
-        both = np.concatenate([by_state, by_size], axis=2).transpose(0, 2, 1)
-        return CameraTerms(
-            both @ by_camera,
-            by_camera.transpose(0, 2, 1) @ by_camera,
-            gradient,
-            np.concatenate([steps.by_from[:, ABOVE], steps.by_to[:, ABOVE]], axis=1),
-            rest_by_camera,
-        )
-
-    sigmas = first_sigmas(bool(moves[0]), problem.noise)
-    middle = first.copy()
-    middle[[ABOVE, SPEED, TURN]] = 0.0
-    off = (state[0] - middle) / sigmas
-    diagonal[0] += np.diag(sigmas**-2)
-    gradient[0] += off / sigmas
-    off_size = at.log_half - problem.size.log_half
-    precision = problem.size.precision
-    cost += 0.5 * float(np.sum(steps.error**2) + off @ off + off_size @ precision @ off_size)
-    return Equations(
-        cost,
-        diagonal,
-        on @ steps.by_from,
-        of_boxes,
-        transposed @ by_size,
-        np.einsum("nki,nkj->ij", by_size, by_size) + precision,
-        gradient,
-        np.einsum("nki,nk->i", by_size, error) + precision @ off_size,
-        steps.log_density
-        - float(np.log(sigmas).sum())
-        + 0.5 * float(np.linalg.slogdet(precision)[1]),
-        chi2,
-        cameras,
-    )
-
-
-def _only_bounds(problem: TrackProblem, seen: PredictedBoxes) -> Bools:
-    """Return which edges (n, 4) only bound the thing, and are kept by what is predicted.
-
-    Those that something cuts, and of a box with such an edge also those whose corner is outside of
-    the image: the thing may reach beyond them. Where a part of it is beside or behind the camera,
-    it reaches beyond the edges that are cut.
-    """
-    camera = problem.views.camera
-    size = np.array([camera.width, camera.height]) - 0.5
-    outside = ((seen.corner < -0.5) | (seen.corner > size)).any(axis=2)
-    outside |= ~seen.is_whole[:, None]
-    is_cut = np.asarray(problem.truncated.any(axis=1))[:, None]
-    cut = problem.truncated | (is_cut & outside)
-    beyond = (seen.box - problem.box) * [-1.0, -1.0, 1.0, 1.0] > 0.0
-    return np.asarray((cut & beyond) | (problem.truncated & ~seen.is_whole[:, None]))
+    return _core.linearize_track(problem.core, at, moves, first, information)

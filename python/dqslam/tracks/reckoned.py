@@ -8,7 +8,8 @@ import numpy as np
 
 from dqslam import _core
 from dqslam._checks import Floats, Ints
-from dqslam.recording import Odometry
+from dqslam.io.results.covariances import motion_of_camera
+from dqslam.recording import Odometry, Recording
 
 PathCovariance = Callable[[Ints], Floats | None]
 """Joint covariance (6 n, 6 n) of small motions [m, rad] of the cameras at poses (n,), each in its
@@ -38,3 +39,22 @@ def reckoned_covariance(odometry: Odometry, poses: Floats, images: Ints) -> Floa
     joint[after, :, before, :] = block
     joint[before, :, after, :] = block.transpose(0, 2, 1)
     return joint.reshape(len(images) * size, -1)
+
+
+def path_by_odometry(recording: Recording) -> tuple[Floats, PathCovariance]:
+    """Return the path of the odometry of a recording alone, (n, d), and its covariance."""
+    odometry = recording.odometry
+    path = _core.dead_reckon(odometry.pose_model, odometry.first_pose, odometry.relative)
+    motion = motion_of_camera(odometry.pose_model, recording.camera)
+    return path, lambda images: of_cameras(reckoned_covariance(odometry, path, images), motion)
+
+
+def of_cameras(spread: Floats, motion: Floats) -> Floats:
+    """Turn the joint covariance of n poses, (k n, k n), into that of their cameras, (6 n, 6 n).
+
+    ``motion`` (6, k) is the motion of a camera by that of its pose.
+    """
+    count = len(spread) // motion.shape[1]
+    blocks = spread.reshape(count, -1, count, motion.shape[1])
+    moved = np.einsum("ab,ibjc,dc->iajd", motion, blocks, motion, optimize=True)
+    return np.asarray(moved).reshape(6 * count, 6 * count)
