@@ -14,6 +14,7 @@ from dqslam.track import Track
 from dqslam.tracks.candidates import FEWEST_IMAGES, Scene, group_boxes, make_scene, thinned
 from dqslam.tracks.fit import TrackFit, covariance, fit_track
 from dqslam.tracks.ground import Ground
+from dqslam.tracks.join import join_tracklets
 from dqslam.tracks.judge import Judgment, judge
 from dqslam.tracks.mixture import mixed
 from dqslam.tracks.motion import ABOVE, HEADING, SIZE, SPEED, TURN, X, Y
@@ -61,7 +62,8 @@ def estimate_tracks(
     object_rows
         Row of the ellipsoid that each box shows, shape (m,); -1 for those that may show what moves.
     final
-        Whether the tracker's ids are final.
+        Whether the tracker's ids are final: then each of them is a thing by itself, and else
+        tracklets of one thing are joined where its motion predicts it.
     size_prior
         Sizes that were told by class; those of traffic are known.
     """
@@ -71,7 +73,8 @@ def estimate_tracks(
     unknown: list[tuple[Ints, str]] = []
     track_of_box = np.full(len(recording.detections), -1)
     groups = group_boxes(recording, object_rows < 0, final=final)
-    for rows in sorted(groups, key=lambda group: int(recording.detections.pose[group[0]])):
+    groups.sort(key=lambda group: int(recording.detections.pose[group[0]]))
+    for rows in groups if final else join_tracklets(scene, groups):
         judged = _judge(scene, rows, path_covariance)
         if isinstance(judged, str):
             unknown.append((rows, judged))
