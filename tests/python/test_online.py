@@ -76,7 +76,7 @@ def test_one_box_puts_a_sphere_where_its_size_says(problem):
 
 def test_a_polish_finds_what_solve_finds(problem):
     graph = build_graph(problem.recording, box_noise=NOISE, size_prior=dq.SizePrior())
-    estimate, summary = solve(graph, SolveOptions(loss=Loss.NONE))
+    estimate, summary = solve(graph)
     slam = fed(problem)
     polished = slam.polish().result()
     assert polished.cost == pytest.approx(summary.final_cost, rel=1e-6)
@@ -107,7 +107,7 @@ def test_ranges_reach_a_session_as_they_reach_solve(problem):
     _, summary = solve(build_graph(recording, **told), plain)
     _, without = solve(build_graph(replace(recording, measurements=()), **told), plain)
     assert summary.final_cost > without.final_cost + 1.0
-    slam = OnlineSlam(recording.camera, box_noise=NOISE)
+    slam = OnlineSlam(recording.camera, plain, box_noise=NOISE)
     assert len(list(replay(slam, recording))) == len(recording.timestamps)
     assert slam.polish().result().cost == pytest.approx(summary.final_cost, rel=1e-6)
 

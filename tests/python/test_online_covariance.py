@@ -48,12 +48,12 @@ def test_without_boxes_it_grows_as_that_of_the_odometry_over_all_smoothings():
 def test_where_all_poses_are_smoothed_it_is_the_marginal_of_the_whole_problem(scenario):
     recording, truth = dq.simulate(dq.load_scenario(scenario), seed=3)
     all_poses = dq.OnlineOptions(medium_smoothing=dq.SmoothingLevel(10**6, 1, 20))
-    slam, reports = fed(recording, online=all_poses, first_pose=truth.poses[0])
+    options = dq.SolveOptions(loss=dq.Loss.NONE)
+    slam, reports = fed(recording, options=options, online=all_poses, first_pose=truth.poses[0])
     slam.polish()  # at the optimum both have the same linearization
     slam._state.core.smooth(1, 0)
     problem, rows = slam._state.core.to_graph()
     graph = dataclasses.replace(dq.build_graph(recording), core=problem)
-    options = dq.SolveOptions(loss=dq.Loss.NONE)
     ellipsoids = slam._state.core.ellipsoids[rows]  # in the order of the problem
     estimate = dataclasses.replace(slam.estimate(), ellipsoids=ellipsoids)
     exact = dq.marginal_covariances(graph, estimate, options).poses[-1]

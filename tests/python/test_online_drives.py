@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from benchmarks.problems import chain, paper
 
-from dqslam.online import OnlineSlam, steps_of
+from dqslam.online import OnlineSlam, StepBoxes, steps_of
 from test_online_loops import CAMERA, NOISE, ring
 
 
@@ -51,3 +51,24 @@ def test_a_session_is_nearly_as_good_as_its_polish(drives):
     before, after = np.array([errors(*drive()) for drive in drives]).T
     assert np.mean(before) <= 1.25 * np.mean(after)
     assert np.median(before / after) <= 1.25
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_boxes_that_show_something_else_do_not_mislead_a_session(seed):
+    """One box of ten lies somewhere else, one of ten has the id of another object."""
+    problem = paper(seed, 0.5)
+    random = np.random.default_rng(seed)
+    camera, given, truth = steps(problem)
+    names = np.unique(problem.recording.detections.object_id)
+    misled = []
+    for motion, boxes in given:
+        box, ids = boxes.box.copy(), np.array(boxes.object_id)
+        for row in np.flatnonzero(random.random(len(box)) < 0.1):
+            corner = random.uniform(0, [camera.width - 151, camera.height - 151])
+            box[row] = [*corner, *(corner + random.uniform(20, 150, 2))]
+        wrong = random.random(len(ids)) < 0.1
+        ids[wrong] = random.choice(names, wrong.sum())
+        misled.append((motion, StepBoxes(box, ids)))
+    clean, _ = errors(camera, given, truth)
+    before, after = errors(camera, misled, truth)
+    assert max(before, after) <= 2 * clean

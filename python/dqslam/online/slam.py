@@ -49,7 +49,8 @@ class OnlineSlam(SessionReader):
     camera
         The camera of undistorted boxes, and its mount on the robot.
     options
-        Options of the solver for ``polish``. With any loss but ``NONE``, steps are robust too.
+        Options of the solver for ``polish``. With any loss but ``NONE``, steps are robust too:
+        they use a Cauchy loss of the same scale.
     online
         Options of the steps: how many poses are minimized, and when.
     pose_model
@@ -111,8 +112,7 @@ class OnlineSlam(SessionReader):
             pose_model = pose_model_of("first_pose", given)
         self.camera = camera
         self.pose_model = pose_model
-        plain = _core.SolveOptions(loss=_core.Loss.NONE)
-        self.solve_options = plain if options is None else options
+        self.solve_options = _core.SolveOptions() if options is None else options
         if self.solve_options.landmark_model != _core.LandmarkModel.ELLIPSOID:
             raise ValueError("online: only the ellipsoid model has a prior on size")
         online = _core.OnlineOptions() if online is None else online
